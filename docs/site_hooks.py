@@ -13,7 +13,7 @@ from typing import Any
 from latex2mathml.converter import convert
 from mkdocs.structure.files import File
 from steerclear.experiments.docs import keys_page
-from steerclear.experiments.reach.show import tables_page
+from steerclear.experiments.reach.pages import tables_page
 from steerclear.shield.tables.files import read_table
 
 ROOT = Path(__file__).parent.parent

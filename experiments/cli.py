@@ -5,66 +5,73 @@ from __future__ import annotations
 from . import here as here  # isort: split
 
 import sys
-from typing import Annotated
+from importlib import import_module
+from typing import Annotated, Any
 
 import typer
+from rich.markup import escape
+from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.extras import missing
 
-from .commands.ablate import ablate
-from .commands.attack import attack
-from .commands.bench import bench
-from .commands.compare import compare
-from .commands.console import leave_failed
-from .commands.demonstrate import demonstrate
-from .commands.docs import docs
-from .commands.encounters import encounters
-from .commands.entry import app as entry_app
-from .commands.evaluate import evaluate
-from .commands.export import export
-from .commands.once import App
-from .commands.parity import parity
-from .commands.platform import app as platform_app
-from .commands.play import play
-from .commands.reach import app as reach_app
-from .commands.render import render
-from .commands.tournament import tournament
-from .commands.train import train
-from .commands.train_study import train_study
-from .commands.warm_up import warm_up
-from .optional import optional_command
+from .cli_encounters import attack, encounters
+from .cli_entry import app as entry_app
+from .cli_games import ablate, demonstrate, evaluate, play
+from .cli_reach import app as reach_app
+from .cli_tools import bench, compare, docs, parity, platforms_app, render, warm_up
+from .cli_tournament import tournament
+from .cli_train import export, train, train_study
+from .console import EXIT_CODES, App, command, leave_failed
 from .provenance import package_version
 from .terminal import prepare
 
 app = App(
     name="steerclear",
-    help="A safety shield for boats: play, compare and measure it in Maritime Capture the Flag.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for function in (
-    play,
-    evaluate,
-    ablate,
-    compare,
-    tournament,
-    demonstrate,
-    train,
-    export,
-    encounters,
-    attack,
-    parity,
-    bench,
-    render,
-    docs,
-):
-    app.command()(function)
-for name in ("deploy", "preflight", "replay", "referee", "fit", "sim-boats", "sea-trial"):
-    optional_command(app, name)
-app.command("warm-up")(warm_up)
-app.command("train-study")(train_study)
+BASE = (
+    *(play, evaluate, ablate, compare, tournament, demonstrate, train, export, encounters, attack, parity, bench),
+    *(render, docs, warm_up, train_study),
+)
+OF_BOATS = {
+    "cli_boats": ("deploy", "preflight", "referee", "sea-trial"),
+    "cli_logs": ("replay", "fit", "sim-boats"),
+}
+"""Commands that need the extra ``[boats]``, by their module."""
+
+
+def _add_boats(module: str, names: tuple[str, ...]) -> None:
+    """Add commands of boats, or what says which extra they lack."""
+    try:
+        found = import_module(f".{module}", __package__)
+    except ModuleNotFoundError as error:
+        for name in names:
+            lacking = missing(error, f"steerclear {name}")
+            if lacking is None:
+                raise
+            _add_refusal(name, lacking)
+    else:
+        for name in names:
+            app.command(name)(getattr(found, name.replace("-", "_")))
+
+
+def _add_refusal(name: str, lacking: ConfigError) -> None:
+    anything: dict[str, Any] = {"ignore_unknown_options": True, "allow_extra_args": True, "help_option_names": []}
+
+    @app.command(name, context_settings=anything, help=escape(f"Not installed: {lacking}"))
+    @command()
+    def refuse(context: typer.Context) -> None:
+        raise lacking
+
+
+for function in BASE:
+    app.command(function.__name__.replace("_", "-"))(function)
+for module, names in OF_BOATS.items():
+    _add_boats(module, names)
 app.add_typer(reach_app, name="reach")
-app.add_typer(platform_app, name="platform")
+app.add_typer(platforms_app, name="platform")
 app.add_typer(entry_app, name="entry")
 
 
@@ -74,16 +81,16 @@ def _show_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
+@app.callback(
+    help="A safety shield for boats: play, compare and measure it in Maritime Capture the Flag.\n\n"
+    f"Exit status of every command: {', '.join(f'{code:d} {words}' for code, words in EXIT_CODES.items())}."
+)
 def options(
     version: Annotated[
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version.")
     ] = False,
 ) -> None:
-    """A safety shield for boats: play, compare and measure it in Maritime Capture the Flag.
-
-    Exit status of every command: 0 done, 1 a bar is not met, 2 bad input, 70 a fault of steerclear, 130 interrupted.
-    """
+    """Take the options that stand before any command."""
 
 
 def main() -> None:

@@ -14,17 +14,15 @@ from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.foreign import visible
 
 from . import plots
-from .bench.report import bench_tables
+from .bench import bench_tables
 from .docs_encounters import comparison_page
 from .docs_keys import KEYS
 from .markdown import MADE, goals_of, goals_table, line, table
 from .metrics import RADII_M, breach_column
 from .play.conditions import words_of, words_of_settings
-from .reach.played_sets_page import played_page
-from .reach.show import tables_page
-from .reach.unsafe_sets_page import sets_page
-from .tables import interval_text
-from .tournament.pages import write_markdown
+from .reach.pages import played_page, sets_page, tables_page
+from .tables import COVERED_WORDS, columns_of, interval_text
+from .tournament_pages import write_markdown
 from .training.study_page import learning_page
 from .verdicts import HEADS, verdict_rows
 
@@ -32,14 +30,6 @@ Page = tuple[str, str, list[Path]]
 """File name, text, and pictures written beside it."""
 SOURCES = "ablate, evaluate, tournament, bench, encounters, reach compare, reach play or train-study"
 _TIMES = ("decision_p50_us", "decision_p99_us")
-_COLUMNS = (
-    ("off", "shield off"), ("on", "shield on"), ("difference", "on - off, paired"),
-    ("covered", "covered"), ("difference_covered", "covered - off, paired"),
-)  # fmt: skip
-_COVERED_WORDS = (
-    "Shield on leaves boats that the game drives (tagged, out of bounds) to it, as a real game and a wrapped zip do; "
-    "covered decides for them too. Goals are of shield on."
-)
 
 
 def write_pages(results: Sequence[Mapping[str, Any]], folder: Path) -> list[Path]:
@@ -162,7 +152,7 @@ def runs_page(content: Mapping[str, Any], plots: Sequence[Path] = ()) -> str:
     """Write the page of an ablation or evaluation."""
     settings = content["settings"]
     lines = [f"# {line(settings['own'])} on {line(settings['preset'])}", "", MADE, "", _what_was_played(content), ""]
-    lines += [_COVERED_WORDS, ""] if settings.get("covered") else []
+    lines += [COVERED_WORDS, ""] if settings.get("covered") else []
     lines += [f"![off and on]({path.name})\n" for path in plots]
     for summary in content["pairings"]:
         lines += [f"## {line(summary['pairing'])}", "", *_metrics_table(summary), ""]
@@ -222,13 +212,13 @@ def _machine_line(content: Mapping[str, Any]) -> str:
 
 
 def _metrics_table(summary: Mapping[str, Any]) -> list[str]:
-    present = [(key, head) for key, head in _COLUMNS if any(key in figures for figures in summary["metrics"].values())]
+    columns = columns_of(summary)
     rows = [
-        [figures["label"], *(interval_text(figures.get(key)) for key, _ in present)]
+        [figures["label"], *(interval_text(figures.get(key)) for key in columns)]
         for name, figures in summary["metrics"].items()
         if name not in _TIMES  # of a machine that did other things as well: the page of the benchmark has them
     ]
-    return table(["", *(head for _, head in present)], rows)
+    return table(["", *columns.values()], rows)
 
 
 def _reasons_line(reasons: Mapping[str, int]) -> str:

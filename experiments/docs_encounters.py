@@ -21,8 +21,7 @@ COUNTS = ("encounters", "breached", "avoidable", "unavoidable", "not_judged", "d
 MEANS = ("changed_percent", "goal_time_ratio", "reversals_per_min", "decision_us")
 LATER_MEANS = ("never_arrived_percent", "inactive_percent")
 """Means that results of earlier versions lack: theirs stay unknown."""
-NAMED = ("family", "guard", "own", "other")
-NEEDED = (*NAMED, *COUNTS, *MEANS)
+NEEDED = ("family", "guard", "own", "other", *COUNTS, *MEANS)
 NO_GUARD = "none"
 
 Cell = Mapping[str, Any]
@@ -83,32 +82,8 @@ def cells_of(content: Mapping[str, Any]) -> list[dict[str, Any]]:
         missing = [key for key in (*NEEDED, *CONDITIONS, "seed") if key not in cell]
         if missing:
             raise ConfigError(f"a cell of the encounter results has no {', '.join(missing)}; run `encounters` again")
-        _check_kinds(cell)
         cells.append(cell)
     return cells
-
-
-def _check_kinds(cell: Mapping[str, Any]) -> None:
-    """Refuse names that are none, and figures that are no numbers.
-
-    Raises:
-        ConfigError: there is one.
-    """
-    wrong = [name for name in NAMED if not isinstance(cell[name], str)]
-    wrong += [name for name in (*COUNTS, "seed") if not _is_count(cell[name])]
-    wrong += [name for name in CONDITIONS if not _is_number(cell[name])]
-    means = [name for name in (*MEANS, *LATER_MEANS) if name in cell]
-    wrong += [name for name in means if cell[name] is not None and not _is_number(cell[name])]
-    if wrong:
-        raise ConfigError(f"a cell of the encounter results has no usable {', '.join(wrong)}; run `encounters` again")
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e15
-
-
-def _is_count(value: Any) -> bool:
-    return _is_number(value) and value >= 0 and value == int(value)
 
 
 def contests_of(cells: Iterable[Cell]) -> list[Contest]:

@@ -16,7 +16,7 @@ from .deploy.keys import REPLAY as _REPLAY
 from .encounters.attack import KEYS as _ATTACK
 from .encounters.figures import KEYS as _ENCOUNTERS
 from .metrics import GAME_COLUMNS, GOAL_KEYS, breach_column, columns_of, game_metrics_of, meanings_of
-from .tournament.keys import TOURNAMENT as _TOURNAMENT
+from .tournament_keys import TOURNAMENT as _TOURNAMENT
 
 BREACH = {
     "step": "first step inside the radius",

@@ -18,7 +18,7 @@ from steerclear.env.record import NOT_COVERED, Record, find_breaches, read_meta
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array, BoolArray, kernel
 
-from .metrics import RADII_M, breach_column
+from .metrics import RADII_M, breach_column, game_metrics_of
 
 
 @dataclass(frozen=True)
@@ -241,7 +241,7 @@ def tally(record: Record, side: int, radii_m: Sequence[float] = RADII_M) -> dict
     Returns:
         Flat columns: ``breaches_teammate_2.5m`` and so on, ``closest_*_m`` (None without such a pair),
         ``clean_games`` (none at the smallest radius), ``collisions`` (what the game's score counts), the columns of
-        `shield_columns` and ``deadlocks``.
+        `shield_columns`, ``deadlocks`` and what metrics measure by themselves.
     """
     meta = read_meta(record)
     distances = PairDistances.of(record["position"])
@@ -251,6 +251,7 @@ def tally(record: Record, side: int, radii_m: Sequence[float] = RADII_M) -> dict
         "collisions": scored_collisions(_when_looked(record, meta), meta, side),
         **shield_columns(record, own, dt_s),
         "deadlocks": count_deadlocks(record["speed_mps"][1:], record["wanted"][..., 0], own, dt_s),
+        **{one.column: one.measure(record, side) for one in game_metrics_of(radii_m) if one.measure is not None},
     }
 
 
@@ -307,15 +308,18 @@ def driven_breaches(
         radii_m: radii at which to count.
 
     Returns:
-        Per radius ``breaches_driven_2.5m`` and so on, of team-mates and with opponents.
+        Per radius ``breaches_driven_2.5m`` and so on, and of them those of two own boats,
+        ``breaches_driven_teammate_2.5m``, and with opponents, ``breaches_driven_opponent_2.5m``.
     """
     own = np.asarray(read_meta(record)["team"]) == side
     found = {}
     for radius_m in radii_m:
         rows = find_breaches(record["position"], radius_m)[:, :3].astype(np.int64)
         steps, boats = rows[:, 0] - 1, rows[:, 1:]
-        inside = own[boats] & driven[steps[:, None], boats]
-        found[breach_column("driven", radius_m)] = int(inside.any(axis=1).sum())
+        hit = (own[boats] & driven[steps[:, None], boats]).any(axis=1)
+        mates = own[boats].all(axis=1)
+        for name, kind in (("driven", hit), ("driven_teammate", hit & mates), ("driven_opponent", hit & ~mates)):
+            found[breach_column(name, radius_m)] = int(kind.sum())
     return found
 
 

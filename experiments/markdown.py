@@ -8,7 +8,7 @@ from typing import Any
 
 from steerclear.shield.foreign import visible
 
-from .tables import measured_text, number_text
+from .tables import goal_cells
 
 MADE = "<!-- made by `steerclear docs`; do not edit -->"
 
@@ -36,11 +36,7 @@ def table(heads: Sequence[str], rows: Sequence[Sequence[Any]]) -> list[str]:
 def goals_table(goals: Sequence[Mapping[str, Any]]) -> list[str]:
     """Lines of the table of goals: what was measured, what is asked, whether it is met."""
     verdict = {True: "met", False: "**not met**", None: "no data"}
-    rows = [
-        [bar["name"], measured_text(bar), f"{bar['sense']} {number_text(bar['limit'])}", verdict[bar["met"]]]
-        for bar in goals
-    ]
-    return table(["", "measured", "goal", ""], rows)
+    return table(["", "measured", "goal", ""], [[*goal_cells(goal), verdict[goal["met"]]] for goal in goals])
 
 
 def goals_of(content: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:

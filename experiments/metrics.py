@@ -1,7 +1,7 @@
 """Every figure of games: the one place where a metric is named, and what is asked of it.
 
 A `Metric` chooses its interval (`statistics.figure`), labels tables, tiles and plots, and documents its JSON keys. To
-add one: write its column in `game_metrics.tally` (or `match.Match`), and one line in `game_metrics_of` here.
+add one: a line in `OWN` here, whose ``measure`` tells it from a game's record.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from .statistics import Interval, count_interval, paired_ratio
 
 if TYPE_CHECKING:
     import pandas as pd
+    from steerclear.env.record import Record
 
 RADII_M = (2.5, 4.0)
 """Radii at which breaches are always counted: the shield's default and the `mctf2025` game's own."""
@@ -34,6 +35,7 @@ class Metric:
         name: key in results; empty: the column.
         paired: whether a difference of pairs is meaningful.
         of_shield: it describes the shield, so that there is nothing to show without one.
+        measure: from a game's record and a team, 0 blue or 1 red, to the column; None: it is counted elsewhere.
     """
 
     column: str
@@ -45,6 +47,7 @@ class Metric:
     name: str = ""
     paired: bool = True
     of_shield: bool = False
+    measure: Callable[[Record, int], float | None] | None = None
 
     @property
     def key(self) -> str:
@@ -60,6 +63,10 @@ class Metric:
 def breach_column(kind: str, radius_m: float) -> str:
     """Name the column of a count: `breaches_opponent_2.5m`."""
     return f"breaches_{kind}_{float(radius_m)}m"
+
+
+OWN: tuple[Metric, ...] = ()
+"""Further figures of games: rows, tables, plots, comparisons and keys follow."""
 
 
 def game_metrics_of(radii_m: Sequence[float] = RADII_M) -> list[Metric]:
@@ -122,6 +129,7 @@ def game_metrics_of(radii_m: Sequence[float] = RADII_M) -> list[Metric]:
         ),
         Metric("primary", "mean", "primary score", "", "captures - captures_against - penalty * collisions"),
         Metric("secondary", "mean", "secondary score", "", "grabs + tags - grabs_against - tags_against"),
+        *OWN,
     ]
 
 
@@ -198,12 +206,14 @@ class Goal:
         measure: from the table to the figure; None: there is nothing to judge, and no goal.
         sense: ``<=`` or ``>=``.
         limit: what is asked.
+        beside: from the table to what is not judged, in words; empty: nothing.
     """
 
     name: str
     measure: Callable[[pd.DataFrame], Interval | None]
     sense: str
     limit: float
+    beside: Callable[[pd.DataFrame], str] = lambda table: ""
 
 
 _GOAL = {
@@ -214,6 +224,7 @@ _GOAL = {
     "sense": "<= or >=",
     "limit": "what is asked",
     "met": "whether it is met; null without data",
+    "note": "what is beside it and not judged, such as hits of boats that the game drives; absent without any",
 }
 GOAL_KEYS = {
     **{f"goals[].{name}": words for name, words in _GOAL.items()},
@@ -226,13 +237,16 @@ def check(goals: Sequence[Goal], table: pd.DataFrame) -> list[dict[str, Any]]:
     """Judge a run.
 
     Returns:
-        Per goal ``name``, ``value``, ``low``, ``high``, ``sense``, ``limit``, ``met`` (None without data).
+        Per goal ``name``, ``value``, ``low``, ``high``, ``sense``, ``limit``, ``met`` (None without data); ``note``
+        where something beside it is not judged.
     """
     found = []
     for goal in goals:
         figure = goal.measure(table)
         if figure is not None:
-            found.append(judged(goal.name, figure.value, goal.sense, goal.limit, figure.low, figure.high))
+            entry = judged(goal.name, figure.value, goal.sense, goal.limit, figure.low, figure.high)
+            note = goal.beside(table)
+            found.append({**entry, "note": note} if note else entry)
     return found
 
 
@@ -253,9 +267,21 @@ def judged(
     return {"name": name, "value": value, "low": low, "high": high, "sense": sense, "limit": limit, "met": met}
 
 
-def total(column: str) -> Callable[[pd.DataFrame], Interval | None]:
-    """Events of all shielded games that have an unshielded pair."""
-    return lambda table: _of(pairs_of(table), lambda pairs: Interval(float(pairs[f"{column}_on"].sum()), *_NONE))
+def commanded(pairs: pd.DataFrame, kind: str, radius_m: float, state: str) -> Any:
+    """Breaches of boats that the team commands, per game of `pairs_of`: all but those of boats that the game drives."""
+    driven = pairs.get(f"{breach_column(f'driven_{kind}', radius_m)}_{state}", 0)
+    return pairs[f"{breach_column(kind, radius_m)}_{state}"] - driven
+
+
+def _driven_words(kind: str, radius_m: float) -> Callable[[pd.DataFrame], str]:
+    """How many shielded breaches are of boats that the game drives; they obey nobody, and are not judged."""
+
+    def words(table: pd.DataFrame) -> str:
+        column, pairs = f"{breach_column(f'driven_{kind}', radius_m)}_on", pairs_of(table)
+        count = int(pairs[column].sum()) if column in pairs else 0
+        return f"beside {count} of boats that the game drives" if count else ""
+
+    return words
 
 
 def rate(column: str, paired: bool = True) -> Callable[[pd.DataFrame], Interval | None]:
@@ -273,14 +299,20 @@ def rate(column: str, paired: bool = True) -> Callable[[pd.DataFrame], Interval 
 
 def on_over_off(column: str) -> Callable[[pd.DataFrame], Interval | None]:
     """Events with the shield over those without, games paired."""
-    return lambda table: _of(pairs_of(table), lambda pairs: paired_ratio(pairs[f"{column}_off"], pairs[f"{column}_on"]))
+    return _paired(lambda pairs: paired_ratio(pairs[f"{column}_off"], pairs[f"{column}_on"]))
 
 
 _NONE = (float("nan"), float("nan"))
 
 
-def _of(pairs: pd.DataFrame, measure: Callable[[pd.DataFrame], Interval]) -> Interval | None:
-    return measure(pairs) if len(pairs) else None
+def _paired(measure: Callable[[pd.DataFrame], Interval]) -> Callable[[pd.DataFrame], Interval | None]:
+    """A figure of games with a pair; None without any."""
+
+    def of(table: pd.DataFrame) -> Interval | None:
+        pairs = pairs_of(table)
+        return measure(pairs) if len(pairs) else None
+
+    return of
 
 
 def pairs_of(table: pd.DataFrame) -> pd.DataFrame:
@@ -295,10 +327,18 @@ def pairs_of(table: pd.DataFrame) -> pd.DataFrame:
 
 def game_goals(separation_m: float) -> list[Goal]:
     """What is asked of an ablation, all pairings together."""
-    mates, opponents = (breach_column(kind, separation_m) for kind in ("teammate", "opponent"))
+
+    def mates(pairs: pd.DataFrame) -> Interval:
+        return Interval(float(commanded(pairs, "teammate", separation_m, "on").sum()), *_NONE)
+
+    def opponents(pairs: pd.DataFrame) -> Interval:
+        return paired_ratio(*(commanded(pairs, "opponent", separation_m, state) for state in ("off", "on")))
+
+    beside = {kind: _driven_words(kind, separation_m) for kind in ("teammate", "opponent")}
+    at = f"at {separation_m:g} m, of boats the team commands"
     return [
-        Goal(f"hits with team-mates at {separation_m:g} m, shielded, all games", total(mates), "<=", 0.0),
-        Goal(f"hits with opponents at {separation_m:g} m, on / off", on_over_off(opponents), "<=", 0.1),
+        Goal(f"hits with team-mates {at}, shielded, all games", _paired(mates), "<=", 0.0, beside["teammate"]),
+        Goal(f"hits with opponents {at}, on / off", _paired(opponents), "<=", 0.1, beside["opponent"]),
         Goal("captures, on / off", on_over_off("captures"), ">=", 0.9),
         Goal("deadlocks, shielded, per game", rate("deadlocks"), "<=", 0.0),
         Goal(f"avoidable hits at {separation_m:g} m, shielded, per game", rate("avoidable", False), "<=", 0.0),

@@ -5,6 +5,8 @@ from __future__ import annotations
 import hashlib
 import os
 import platform
+import time
+from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -29,10 +31,10 @@ SOURCES = ("*.py", "*.npz", "shipped/*.yaml")
 NO_GAME = (
     "shield/bridge/",
     "env/render/",
-    *(f"experiments/{name}/" for name in ("boats", "commands")),
+    "experiments/boats/",
     *(f"experiments/{name}.py" for name in ("docs", "docs_encounters", "docs_keys", "markdown", "page", "plots")),
     *(f"experiments/{name}.py" for name in ("report", "replay_data", "replay_html", "tables", "terminal")),
-    "experiments/cli",
+    *(f"experiments/{name}" for name in ("cli", "console", "saving", "tournament_pages")),
 )
 """How the names of files begin whose code changes no result that is kept on disk."""
 
@@ -76,6 +78,12 @@ def machine() -> dict[str, Any]:
         "memory_gib": _memory_gib(),
         "system": f"{platform.system()} {platform.release()}",
     }
+
+
+def head_of(command: str, settings: Mapping[str, Any], started_s: float) -> dict[str, Any]:
+    """What JSON of a command begins with; ``started_s``: when it began, by `time.perf_counter`."""
+    head = {"command": command, "settings": dict(settings), "versions": versions(), "machine": machine()}
+    return {**head, "wall_s": time.perf_counter() - started_s}
 
 
 def _processor() -> str:

@@ -9,13 +9,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from markupsafe import Markup
-from steerclear.shield.exceptions import ConfigError
 
 from . import plots
 from .metrics import RADII_M, REASONS, breach_column, game_metrics_of, meanings_of
 from .page import render, write_page
 from .play.conditions import words_of
-from .tables import interval_text, limits_text, measured_text, number_text
+from .tables import COVERED_WORDS, columns_of, goal_cells, interval_text, limits_text, number_text
 from .verdicts import COVERED, HEADS, OFF, ON, state_of, verdict_rows
 
 Summary = Mapping[str, Any]
@@ -131,9 +130,10 @@ def goal_rows(goals: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
     rows = []
     for goal in goals:
         verdict, style = VERDICTS[goal["met"]]
-        asked = f"{goal['sense']} {number_text(goal['limit'])}".replace("<=", "≤").replace(">=", "≥")
-        measured = measured_text(goal) + limits_text(goal)
-        rows.append({"name": goal["name"], "measured": measured, "asked": asked, "verdict": verdict, "style": style})
+        name, measured, asked = goal_cells(goal)
+        asked = asked.replace("<=", "≤").replace(">=", "≥")
+        measured += limits_text(goal)
+        rows.append({"name": name, "measured": measured, "asked": asked, "verdict": verdict, "style": style})
     return rows
 
 
@@ -187,10 +187,9 @@ def write_report(results: Mapping[str, Any], path: str | os.PathLike[str]) -> Pa
         path: File to write.
 
     Raises:
-        ConfigError: Something is missing, or the file cannot be written.
+        ConfigError: The file cannot be written.
     """
     separation_m = separation_of(results)
-    check_results(results, separation_m)
     breaches = results.get("breaches") or ()
     return Report(
         title=results.get("title") or _played(results["settings"])[0],
@@ -221,30 +220,6 @@ def separation_of(results: Mapping[str, Any]) -> float:
     """Return the shield's separation radius, m."""
     settings = results.get("settings") or {}
     return float(settings.get("separation_m") or (settings.get("shield") or {}).get("separation_m") or RADII_M[0])
-
-
-def check_results(results: Mapping[str, Any], separation_m: float) -> None:
-    """Check that everything the report shows is there.
-
-    Raises:
-        ConfigError: Names all that is missing.
-    """
-    missing = [name for name in ("settings", "versions", "pairings", "games") if name not in results]
-    if not missing:
-        figures = [breach_column(kind, separation_m) for kind in ("teammate", "opponent")]
-        figures += ["captures", "closest_m", "changed_share"]
-        for k, pairing in enumerate(results["pairings"]):
-            needed = ("pairing", "games_off", "games_on", "metrics", "reasons")
-            missing += [f"pairings[{k}].{name}" for name in needed if name not in pairing]
-            missing += [f"pairings[{k}].metrics.{n}" for n in figures if n not in pairing.get("metrics", {})]
-        for k, row in enumerate(results["games"]):
-            needed = ("pairing", "game", "shielded", "seed", "closest_m")
-            missing += [f"games[{k}].{name}" for name in needed if name not in row]
-    if not missing and not results["pairings"]:
-        missing = ["any pairing"]
-    if missing:
-        shown = ", ".join(missing[:8]) + (f" and {len(missing) - 8} more" if len(missing) > 8 else "")
-        raise ConfigError(f"the results lack {shown}; pass what `steerclear ablate` writes to results.json.")
 
 
 def _subtitle(results: Mapping[str, Any], separation_m: float) -> str:
@@ -357,19 +332,12 @@ def reason_words(name: str) -> str:
 
 def _pairing_table(pairing: Summary) -> Table:
     told = meanings_of(game_metrics_of())
-    columns = {"off": "shield off", "on": "shield on", "difference": "on − off, paired"}
+    columns = {key: head.replace(" - ", " − ") for key, head in columns_of(pairing).items()}
+    covered = pairing.get("games_covered")
     note = f"{pairing['games_off']} games without, {pairing['games_on']} with the shield; per game [95 % interval]"
-    if covered := pairing.get("games_covered"):
-        columns |= {"covered": "covered", "difference_covered": "covered − off, paired"}
-        note += (
-            f". Shield on leaves boats that the game drives (tagged, out of bounds) to it, as a real game does; "
-            f"covered ({covered} games) decides for them too. Goals are of shield on"
-        )
+    note += f". {COVERED_WORDS} {covered} games covered." if covered else ""
     rows = [
-        [
-            Cell(figures.get("label", key), told.get(key, "")),
-            *(interval_text(figures.get(part)) for part in columns),
-        ]
+        [Cell(figures.get("label", key), told.get(key, "")), *(interval_text(figures.get(part)) for part in columns)]
         for key, figures in pairing["metrics"].items()
     ]
     return Table(pairing["pairing"], ["", *columns.values()], rows, note)

@@ -68,6 +68,31 @@ def make_folder_of(path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
 
 
+def make_folder(folder: Path) -> None:
+    """Make a folder that results go to.
+
+    Raises:
+        ConfigError: it cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError(f"cannot write to {folder} ({error.strerror}); choose another --out") from error
+
+
+def write_new(path: Path, option: str, text: str) -> None:
+    """Write a text file that is not there yet, and the folders it lies in.
+
+    Raises:
+        ConfigError: it cannot be written.
+    """
+    try:
+        make_folder_of(path)
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(f"{option} {path} cannot be written ({error.strerror}); choose another place") from None
+
+
 def lock_folder(folder: Path) -> BaseFileLock:
     """Make a folder this process's own as long as what is returned lives; several users in one process share it.
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from .metrics import Metric
 
 CONFIDENCE = 0.95
+TAIL = (1.0 - CONFIDENCE) / 2.0
 RESAMPLES = 4000
 Statistic = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 DIFFERENCE = "difference"
@@ -38,100 +39,74 @@ class Interval:
     high: float
 
 
-def share_interval(successes: int, trials: int, confidence: float = CONFIDENCE) -> Interval:
-    """Wilson score interval of a share.
+NAN = float("nan")
 
-    Args:
-        successes: how many trials had the property.
-        trials: how many there were; with none the limits are 0 and 1 and the value is NaN.
-        confidence: probability that the interval covers the true share.
+
+def share_interval(successes: int, trials: int) -> Interval:
+    """Wilson score interval of a share; without trials the limits are 0 and 1, and there is no value.
 
     Raises:
-        ConfigError: negative numbers, more successes than trials, or a confidence outside (0, 1).
+        ConfigError: negative numbers, or more successes than trials.
     """
-    _check_confidence(confidence)
     if not 0 <= successes <= trials:
         raise ConfigError(f"a share needs 0 <= successes <= trials; got {successes} of {trials}")
     if trials == 0:
-        return Interval(float("nan"), 0.0, 1.0)
-    limits = stats.binomtest(successes, trials).proportion_ci(confidence, method="wilson")
+        return Interval(NAN, 0.0, 1.0)
+    limits = stats.binomtest(successes, trials).proportion_ci(CONFIDENCE, method="wilson")
     return Interval(successes / trials, float(limits.low), float(limits.high))
 
 
-def count_interval(events: int, exposure: float = 1.0, confidence: float = CONFIDENCE) -> Interval:
-    """Exact Poisson interval (Garwood) of a rate: events per unit of exposure.
+def count_interval(events: int, exposure: float = 1.0) -> Interval:
+    """Exact Poisson interval (Garwood) of a rate: events per unit of exposure, such as per game.
 
-    With zero events all of the error probability goes to the upper limit, which is then ``-ln(1 - confidence)``
-    events: the rule of three at 95 %.
-
-    Args:
-        events: how many happened, over all the exposure.
-        exposure: what they are counted over, e.g. the number of games; must be positive.
-        confidence: probability that the interval covers the true rate, at least.
+    With zero events all of the error probability goes to the upper limit, which is then ``-ln(0.05)`` events: the rule
+    of three.
 
     Raises:
-        ConfigError: a negative count, an exposure that is not positive, or a confidence outside (0, 1).
+        ConfigError: a negative count, or an exposure that is not positive.
     """
-    _check_confidence(confidence)
     if events < 0 or not exposure > 0.0:
         raise ConfigError(f"a rate needs events >= 0 and exposure > 0; got {events} over {exposure}")
     if events == 0:
-        return Interval(0.0, 0.0, -np.log1p(-confidence) / exposure)
-    tail = (1.0 - confidence) / 2.0
-    low = stats.chi2.ppf(tail, 2 * events) / 2.0
-    high = stats.chi2.ppf(1.0 - tail, 2 * (events + 1)) / 2.0
+        return Interval(0.0, 0.0, -np.log1p(-CONFIDENCE) / exposure)
+    low = stats.chi2.ppf(TAIL, 2 * events) / 2.0
+    high = stats.chi2.ppf(1.0 - TAIL, 2 * (events + 1)) / 2.0
     return Interval(events / exposure, float(low) / exposure, float(high) / exposure)
 
 
-def mean_interval(values: ArrayLike, seed: int = 0, confidence: float = CONFIDENCE) -> Interval:
+def mean_interval(values: ArrayLike, seed: int = 0) -> Interval:
     """Bootstrap percentile interval of a mean; NaN values are left out, limits are NaN below two values.
 
     Args:
         values: one number per game, shape (n,).
         seed: of the resampling; the same seed gives the same limits.
-        confidence: probability that the interval covers the true mean, about.
-
-    Raises:
-        ConfigError: a confidence outside (0, 1).
     """
     kept = np.asarray(values, dtype=np.float64).ravel()
     kept = kept[~np.isnan(kept)]
-    return bootstrap_interval(kept[:, None], _mean_of_first, seed, confidence)
+    return bootstrap_interval(kept[:, None], lambda rows: rows[..., 0].mean(axis=-1), seed)
 
 
-def student_interval(values: ArrayLike, confidence: float = CONFIDENCE) -> Interval:
-    """Student's t interval of a mean of few values, such as one per training; NaN limits below two, or of equal ones.
-
-    Args:
-        values: shape (n,).
-        confidence: probability that the interval covers the true mean, where the values are normal.
-
-    Raises:
-        ConfigError: a confidence outside (0, 1).
-    """
-    _check_confidence(confidence)
+def student_interval(values: ArrayLike) -> Interval:
+    """Student's t interval of a mean of few values, such as of trainings; NaN limits below two, or of equal ones."""
     found = np.asarray(values, dtype=np.float64).ravel()
-    nan = float("nan")
-    if len(found) == 0:
-        return Interval(nan, nan, nan)
-    mean = float(found.mean())
+    mean = float(found.mean()) if len(found) else NAN
     if len(found) < 2 or np.ptp(found) == 0.0:
-        return Interval(mean, nan, nan)
-    reach = float(stats.t.ppf(0.5 + 0.5 * confidence, len(found) - 1) * found.std(ddof=1) / np.sqrt(len(found)))
+        return Interval(mean, NAN, NAN)
+    reach = float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, len(found) - 1) * found.std(ddof=1) / np.sqrt(len(found)))
     return Interval(mean, mean - reach, mean + reach)
 
 
-def paired_difference(off: ArrayLike, on: ArrayLike, seed: int = 0, confidence: float = CONFIDENCE) -> Interval:
+def paired_difference(off: ArrayLike, on: ArrayLike, seed: int = 0) -> Interval:
     """Bootstrap interval of the mean of ``on - off``, games paired by position (same seeds).
 
     Raises:
         ConfigError: the two differ in length, so that they cannot be pairs.
     """
     off_values, on_values = _pair(off, on)
-    return mean_interval(on_values - off_values, seed, confidence)
+    return mean_interval(on_values - off_values, seed)
 
 
-def paired_ratio(off: ArrayLike, on: ArrayLike, seed: int = 0, confidence: float = CONFIDENCE) -> Interval:
+def paired_ratio(off: ArrayLike, on: ArrayLike, seed: int = 0) -> Interval:
     """Interval of a ratio of counts, ``sum(on) / sum(off)``: bootstrap, pairs resampled together.
 
     Where one of them never happened, or every resample gives the same ratio, the limits are those of
@@ -142,42 +117,36 @@ def paired_ratio(off: ArrayLike, on: ArrayLike, seed: int = 0, confidence: float
     """
     rows = np.column_stack(_pair(off, on))
     if len(rows) == 0:
-        return Interval(float("nan"), float("nan"), float("nan"))
+        return Interval(NAN, NAN, NAN)
     totals = rows.sum(axis=0)
-    found = bootstrap_interval(rows, _ratio_of_totals, seed, confidence) if totals.all() else None
+    found = bootstrap_interval(rows, _ratio_of_totals, seed) if totals.all() else None
     if found is not None and (len(rows) < 2 or not np.isnan(found.low)):
         return found
-    return count_ratio_interval(int(totals[0]), int(totals[1]), confidence)
+    return count_ratio_interval(int(totals[0]), int(totals[1]))
 
 
-def count_ratio_interval(off: int, on: int, confidence: float = CONFIDENCE) -> Interval:
+def count_ratio_interval(off: int, on: int) -> Interval:
     """Exact limits of the ratio of two rates, ``on / off``, counted over the same exposure.
 
     Of all events, those counted ``on`` are a binomial share p, and the ratio is p / (1 - p). With no event on one side
     all of the error probability goes to the limit on the other; with none at all the ratio may be anything.
 
-    Args:
-        off: events in the denominator.
-        on: events in the numerator.
-        confidence: probability that the interval covers the true ratio, at least.
-
     Raises:
-        ConfigError: a negative count, or a confidence outside (0, 1).
+        ConfigError: a negative count.
     """
-    _check_confidence(confidence)
     if min(off, on) < 0:
         raise ConfigError(f"a ratio of counts needs counts >= 0; got {on} over {off}")
     infinite = float("inf")
     if off == on == 0:
-        return Interval(float("nan"), 0.0, infinite)
-    tail = (1.0 - confidence) / (2.0 if off and on else 1.0)
+        return Interval(NAN, 0.0, infinite)
+    tail = TAIL if off and on else 2.0 * TAIL
     low = float(stats.beta.ppf(tail, on, off + 1)) if on else 0.0
     high = float(stats.beta.ppf(1.0 - tail, on + 1, off)) if off else 1.0
     low, high = (share / (1.0 - share) if share < 1.0 else infinite for share in (low, high))
     return Interval(on / off if off else infinite, low, high)
 
 
-def count_difference(off: ArrayLike, on: ArrayLike, seed: int = 0, confidence: float = CONFIDENCE) -> Interval:
+def count_difference(off: ArrayLike, on: ArrayLike, seed: int = 0) -> Interval:
     """Interval of the mean of ``on - off`` of counts, games paired by position.
 
     As `paired_difference`; where the games are all alike, the limits are those that the two rates by themselves leave.
@@ -186,46 +155,33 @@ def count_difference(off: ArrayLike, on: ArrayLike, seed: int = 0, confidence: f
         ConfigError: the two differ in length, so that they cannot be pairs.
     """
     off_values, on_values = _pair(off, on)
-    found = paired_difference(off_values, on_values, seed, confidence)
+    found = paired_difference(off_values, on_values, seed)
     if len(off_values) < 2 or not np.isnan(found.low):
         return found
-    before, after = (count_interval(int(v.sum()), len(v), confidence) for v in (off_values, on_values))
+    before, after = (count_interval(int(v.sum()), len(v)) for v in (off_values, on_values))
     return Interval(found.value, after.low - before.high, after.high - before.low)
 
 
-def bootstrap_interval(
-    rows: NDArray[np.float64], statistic: Statistic, seed: int = 0, confidence: float = CONFIDENCE
-) -> Interval:
+def bootstrap_interval(rows: NDArray[np.float64], statistic: Statistic, seed: int = 0) -> Interval:
     """Percentile bootstrap of any statistic of games; limits are NaN where every resample gives the same number.
 
     Args:
         rows: (n, k), one row per game, resampled as a whole.
         statistic: maps (..., n, k) to (...): computed for all resamples at once.
         seed: of the resampling.
-        confidence: probability that the interval covers the true value, about.
-
-    Raises:
-        ConfigError: a confidence outside (0, 1).
     """
-    _check_confidence(confidence)
-    nan = float("nan")
     if len(rows) == 0:
-        return Interval(nan, nan, nan)
+        return Interval(NAN, NAN, NAN)
     value = float(statistic(rows))
     if len(rows) < 2:
-        return Interval(value, nan, nan)
+        return Interval(value, NAN, NAN)
     picks = np.random.default_rng(seed).integers(0, len(rows), size=(RESAMPLES, len(rows)))
     resampled = statistic(rows[picks])
     resampled = resampled[np.isfinite(resampled)]
     if len(resampled) == 0 or np.ptp(resampled) == 0.0:
-        return Interval(value, nan, nan)
-    tail = (1.0 - confidence) / 2.0
-    low, high = np.quantile(resampled, [tail, 1.0 - tail])
+        return Interval(value, NAN, NAN)
+    low, high = np.quantile(resampled, [TAIL, 1.0 - TAIL])
     return Interval(value, float(low), float(high))
-
-
-def _mean_of_first(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    return rows[..., 0].mean(axis=-1)
 
 
 def _ratio_of_totals(rows: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -235,23 +191,17 @@ def _ratio_of_totals(rows: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _pair(off: ArrayLike, on: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    off_values = np.asarray(off, dtype=np.float64).ravel()
-    on_values = np.asarray(on, dtype=np.float64).ravel()
+    off_values, on_values = (np.asarray(values, dtype=np.float64).ravel() for values in (off, on))
     if len(off_values) != len(on_values):
         raise ConfigError(f"paired games must be equally many; got {len(off_values)} off and {len(on_values)} on")
     return off_values, on_values
 
 
-def _check_confidence(confidence: float) -> None:
-    if not 0.0 < confidence < 1.0:
-        raise ConfigError(f"confidence must be between 0 and 1; got {confidence}; use 0.95 for 95 % intervals")
-
-
-def upper_bound(events: int, trials: int, confidence: float = CONFIDENCE) -> float:
+def upper_bound(events: int, trials: int) -> float:
     """One-sided upper limit of a probability (Clopper and Pearson 1934); 1 without trials."""
     if trials == 0 or events >= trials:
         return 1.0
-    return float(stats.beta.ppf(confidence, events + 1, trials - events))
+    return float(stats.beta.ppf(CONFIDENCE, events + 1, trials - events))
 
 
 def figure(table: pd.DataFrame, metric: Metric, seed: int = 0) -> tuple[Interval, int]:
@@ -260,13 +210,12 @@ def figure(table: pd.DataFrame, metric: Metric, seed: int = 0) -> tuple[Interval
     The interval is chosen here and nowhere else: Garwood of a count, Wilson of a share, the bootstrap of a mean and of
     a percent (of totals), none of a least.
     """
-    nan = float("nan")
     values = _values(table, metric)
     n = len(values)
     if metric.kind == "least":
-        return Interval(float(values.min(initial=np.inf)) if n else nan, nan, nan), n
+        return Interval(float(values.min(initial=np.inf)) if n else NAN, NAN, NAN), n
     if n == 0:
-        return Interval(nan, nan, nan), 0
+        return Interval(NAN, NAN, NAN), 0
     if metric.kind == "count":
         return count_interval(int(values.sum()), n), n
     if metric.kind == "share":

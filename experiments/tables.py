@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from rich import box
@@ -14,10 +14,31 @@ from .metrics import breach_column
 from .verdicts import SHORT_HEADS, verdict_rows
 
 Figure = Mapping[str, float | None]
+COLUMNS = {
+    "off": "shield off",
+    "on": "shield on",
+    "difference": "on - off, paired",
+    "covered": "covered",
+    "difference_covered": "covered - off, paired",
+}
+"""What is shown of a pairing's figures, where there is any, and its head."""
+COVERED_WORDS = (
+    "Shield on leaves boats that the game drives (tagged, out of bounds) to it, as a real game and a wrapped zip do; "
+    "covered decides for them too. Goals are of shield on."
+)
 _KINDS = (("teammate", "team-mate"), ("opponent", "opponent"))
 _COVERED_SHOWN = ("captures", "net_captures", "clean_games", "changed_share")
 """Figures of the small table of covered games, beside hits; report and results have all."""
 _VERDICTS = {True: Text("met", "green"), False: Text("not met", "red"), None: Text("no data", "yellow")}
+
+
+def columns_of(summary: Mapping[str, Any]) -> dict[str, str]:
+    """The `COLUMNS` that some figure of a pairing has.
+
+    Args:
+        summary: as `ablation.pairings_of` returns it.
+    """
+    return {k: head for k, head in COLUMNS.items() if any(k in figures for figures in summary["metrics"].values())}
 
 
 def pairing_table(summary: Mapping[str, Any]) -> Group:
@@ -28,18 +49,8 @@ def pairing_table(summary: Mapping[str, Any]) -> Group:
     """
     games = max(summary["games_off"], summary["games_on"])
     title = f"{summary['pairing']}: {games} game{'s' if games != 1 else ''}, means per game [95 % interval]"
-    both = bool(summary["games_off"] and summary["games_on"])
-    columns = [
-        ("off", "shield off", bool(summary["games_off"])),
-        ("on", "shield on", bool(summary["games_on"])),
-        ("difference", "on - off, paired", both),
-    ]
-    shown = [(key, head) for key, head, present in columns if present]
-    rows = [
-        [figures["label"], *(interval_text(figures.get(key), short_limit) for key, _ in shown)]
-        for figures in summary["metrics"].values()
-    ]
-    return titled(title, ["", *(head for _, head in shown)], rows)
+    shown = {key: head for key, head in columns_of(summary).items() if "covered" not in key}
+    return _figures(title, summary["metrics"].values(), shown)
 
 
 def covered_table(summary: Mapping[str, Any]) -> Group | None:
@@ -50,12 +61,18 @@ def covered_table(summary: Mapping[str, Any]) -> Group | None:
     """
     if not summary.get("games_covered"):
         return None
-    rows = [
-        [figures["label"], *(interval_text(figures.get(key), short_limit) for key in ("covered", "difference_covered"))]
+    shown = {key: head for key, head in COLUMNS.items() if "covered" in key}
+    chosen = [
+        figures
         for name, figures in summary["metrics"].items()
         if name.startswith("breaches_") or name in _COVERED_SHOWN
     ]
-    return titled("Covering boats that the game drives", ["", "covered", "covered - off, paired"], rows)
+    return _figures("Covering boats that the game drives", chosen, shown)
+
+
+def _figures(title: str, metrics: Iterable[Mapping[str, Any]], columns: Mapping[str, str]) -> Group:
+    rows = [[one["label"], *(interval_text(one.get(key), short_limit) for key in columns)] for one in metrics]
+    return titled(title, ["", *columns.values()], rows)
 
 
 def verdict_table(summary: Mapping[str, Any]) -> Group | None:
@@ -96,11 +113,14 @@ def titled(
 
 def goals_table(goals: Sequence[Mapping[str, Any]]) -> Group:
     """Build the table of goals: what is asked, what was measured, whether it is met."""
-    rows = [
-        [bar["name"], measured_text(bar), f"{bar['sense']} {number_text(bar['limit'])}", _VERDICTS[bar["met"]]]
-        for bar in goals
-    ]
+    rows = [[*goal_cells(goal), _VERDICTS[goal["met"]]] for goal in goals]
     return titled("Goals", ["", "measured", "goal", ""], rows, wrap=True)
+
+
+def goal_cells(goal: Mapping[str, Any]) -> list[str]:
+    """A goal's name, with what is beside it, what was measured, and what is asked."""
+    name = f"{goal['name']} ({goal['note']})" if goal.get("note") else goal["name"]
+    return [name, measured_text(goal), f"{goal['sense']} {number_text(goal['limit'])}"]
 
 
 def interval_text(figure: Figure | None, limit_text: Callable[[float], str] | None = None) -> str:

@@ -41,34 +41,34 @@ class StateLog:
     """Full states of a game (index 0 the start), and which boats it drove itself or had disabled, step by step."""
 
     def __init__(self) -> None:
-        self._states: list[np.ndarray] = []
-        self._driven: list[np.ndarray] = []
-        self._disabled: list[np.ndarray] = []
+        self._rows: dict[str, list[np.ndarray]] = {}
 
     def start(self, core: BatchedMctf) -> None:
         """Begin with a game's start."""
-        self._states, self._driven, self._disabled = [core.state[0].copy()], [], []
+        self._rows = {"state": [core.state[0].copy()], "driven": [], "is_disabled": []}
 
     def step(self, core: BatchedMctf) -> None:
         """Add the state after a step."""
-        self._states.append(core.state[0].copy())
-        self._driven.append(core.driven[0].copy())
-        self._disabled.append(core.is_disabled[0].copy())
+        for name, rows in self._rows.items():
+            rows.append(getattr(core, name)[0].copy())
 
     @property
     def states(self) -> np.ndarray:
         """(T+1, n, 11) state rows."""
-        return np.array(self._states)
+        return np.array(self._rows["state"])
 
     @property
     def driven(self) -> np.ndarray:
         """(T, n) bool."""
-        return np.array(self._driven, dtype=np.bool_).reshape(-1, self._states[0].shape[0])
+        return self._marks("driven")
 
     @property
     def disabled(self) -> np.ndarray:
         """(T, n) bool."""
-        return np.array(self._disabled, dtype=np.bool_).reshape(-1, self._states[0].shape[0])
+        return self._marks("is_disabled")
+
+    def _marks(self, name: str) -> np.ndarray:
+        return np.array(self._rows[name], dtype=np.bool_).reshape(-1, len(self._rows["state"][0]))
 
 
 def helpless(verdict: Verdict, disabled: np.ndarray | None) -> bool:
@@ -131,7 +131,8 @@ def _entry(
         "closest_m": float(row[3]),
     }
     if verdict is None:
-        return {**entry, **_unjudged()}
+        empty = ("last_preventable_s", "other_last_preventable_s", "exhausted", "responsible")
+        return {**entry, "verdict": NOT_JUDGED, **dict.fromkeys(empty), "responsible_boats": []}
     judged = _judged(verdict, own, meta["agent_ids"])
     could = [verdict.of(boat) for boat in own if verdict.of(boat).outcome is Outcome.AVOIDABLE]
     if could and all(helpless(one, disabled) for one in could):
@@ -139,27 +140,18 @@ def _entry(
     return {**entry, **judged}
 
 
-def _unjudged() -> dict[str, Any]:
-    empty = ("last_preventable_s", "other_last_preventable_s", "exhausted", "responsible")
-    return {"verdict": NOT_JUDGED, **dict.fromkeys(empty), "responsible_boats": []}
-
-
 def _judged(both: BreachVerdict, own: Sequence[int], agent_ids: Sequence[str]) -> dict[str, Any]:
     ours = [both.of(boat) for boat in own]
     best = max(ours, key=lambda verdict: -1 if verdict.last_step is None else verdict.last_step)
-    theirs = [verdict for verdict in (both.first, both.second) if verdict.own not in own]
+    theirs = [verdict.last_preventable_s for verdict in (both.first, both.second) if verdict.own not in own]
     return {
         "verdict": best.outcome.value,
         "last_preventable_s": best.last_preventable_s,
-        "other_last_preventable_s": _lead(theirs),
+        "other_last_preventable_s": theirs[0] if theirs else None,
         "exhausted": all(verdict.exhausted for verdict in ours),
         "responsible": _side(both, own),
         "responsible_boats": [agent_ids[boat] for boat in both.responsible_boats()],
     }
-
-
-def _lead(verdicts: Sequence[Verdict]) -> float | None:
-    return verdicts[0].last_preventable_s if verdicts else None
 
 
 def _side(both: BreachVerdict, own: Sequence[int]) -> str:

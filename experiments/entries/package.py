@@ -19,7 +19,7 @@ from steerclear.shield.tables.files import find_table, load_table
 from steerclear.shield.tables.settings import OtherMay
 from steerclear.shield.wrappers.mctf import surroundings_of
 
-from ..play.kept_distance import check_shield
+from ..play.spec import check_shield
 
 SHIELD = Path(steerclear.shield.__file__).parent
 ONBOARD = Path(__file__).parent / "onboard"

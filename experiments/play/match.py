@@ -22,11 +22,10 @@ from ..entries.team import make_team
 from ..game_metrics import driven_breaches, reason_counts, scores, tally
 from ..verdicts import StateLog, judge_game, verdict_columns
 from .openings import opening
-from .playing_env import PlayingEnv, live_view, read_infos
-from .seat import Failures, Seat
+from .policy_runner import Failures, PolicyRunner
+from .recorder import PlayingEnv, Recorder, live_view, read_infos
 from .shielding import Seen, Shielding, shield_game
 from .spec import SIDES, MatchSpec
-from .tape import Tape
 
 Watcher = Callable[[MctfEnv], bool]
 """Called after every step with the env; False ends the game early (a closed window)."""
@@ -69,9 +68,9 @@ class Match:
         names = [spec.own, spec.opponent] if spec.side == "blue" else [spec.opponent, spec.own]
         self.names = dict(zip(SIDES, names, strict=True))
         self.teams = [
-            Seat(team, self.env, ids[k * size : (k + 1) * size]) for k, team in enumerate(_teams(spec, names))
+            PolicyRunner(team, self.env, ids[k * size : (k + 1) * size]) for k, team in enumerate(_teams(spec, names))
         ]
-        self._tape: Tape | None = None
+        self._recorder: Recorder | None = None
         self._log = StateLog() if spec.judged else None
         self._driven: list[NDArray[np.bool_]] = []
         self._decision_us: list[float] = []
@@ -97,7 +96,7 @@ class Match:
         """Let a policy object play a team, 0 blue or 1 red, in place of the named one; before the game begins."""
         size = self.env.config.team_size
         self.teams[team].close()
-        self.teams[team] = Seat(policy, self.env, self.env.possible_agents[team * size : (team + 1) * size])
+        self.teams[team] = PolicyRunner(policy, self.env, self.env.possible_agents[team * size : (team + 1) * size])
 
     def close(self) -> None:
         """Close the window and let the policies give back what they hold."""
@@ -114,7 +113,7 @@ class Match:
         for number, team in enumerate(self.teams):
             team.reset(self.shielding.env, 2 * spec.seed + number)
         meta = self._meta()
-        self._tape = Tape(live_view(self.env.core), meta)
+        self._recorder = Recorder(live_view(self.env.core), meta)
         if self._log is not None:
             self._log.start(self.env.core)
         if self.env.renderer is not None:
@@ -167,10 +166,10 @@ class Match:
             self.env.renderer.overlay = Overlay(*commands, seen.reason, seen.intervened, seen.certificate_m)
 
     def _record_step(self) -> None:
-        if self._moment is None or self._tape is None:
+        if self._moment is None or self._recorder is None:
             raise SteerclearError("the game moved without asking for commands; build the Match anew")
         wanted, sent, seen = self._moment
-        self._tape.step(wanted, sent, seen.reason, seen.intervened, seen.certificate_m)
+        self._recorder.step(wanted, sent, seen.reason, seen.intervened, seen.certificate_m)
         self._driven.append(self.env.core.driven[0].copy())
         if self._log is not None:
             self._log.step(self.env.core)
@@ -179,8 +178,8 @@ class Match:
         self._moment = None
 
     def _result(self, wall_s: float) -> MatchResult:
-        assert self._tape is not None  # _start() made it
-        record = self._tape.finish()
+        assert self._recorder is not None  # _start() made it
+        record = self._recorder.finish()
         record = {**record, "breaches": find_breaches(record["position"], self.shielding.separation_m)}
         return MatchResult(self.spec, self._row(record, wall_s), record)
 

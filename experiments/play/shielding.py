@@ -19,7 +19,7 @@ from steerclear.shield.wrappers.parallel import ShieldedParallelEnv
 
 from ..metrics import RADII_M
 from ..oracle import AT_ONCE, Motion
-from .sea import Sea
+from .conditions import Disturbances
 from .spec import SIDES, MatchSpec
 
 NOBODY_NEAR_M = 1e5
@@ -49,7 +49,7 @@ class Shielding:
         agent_ids: boats that a shield decides for.
         separation_m: radius the own shield keeps (the default's without one), m.
         reason_names: names of the reason codes, by code.
-        sea: the conditions at work; None where there are none.
+        disturbances: the conditions at work; None where there are none.
     """
 
     inner: MctfEnv
@@ -58,14 +58,14 @@ class Shielding:
     agent_ids: list[str] = field(default_factory=list)
     separation_m: float = RADII_M[0]
     reason_names: list[str] = field(default_factory=list)
-    sea: Sea | None = None
+    disturbances: Disturbances | None = None
     _listener: Listener | None = None
     _commands: Array | None = None
 
     @property
     def motion(self) -> Motion:
         """What the oracle has to know of the conditions."""
-        return AT_ONCE if self.sea is None else self.sea.motion
+        return AT_ONCE if self.disturbances is None else self.disturbances.motion
 
     def listen(self, listener: Listener) -> None:
         """Hear of every step's commands, before and after the shields; call once per game, after reset.
@@ -74,8 +74,8 @@ class Shielding:
         """
         self._listener = listener
         self.inner.command_filter = self._wanted
-        if self.sea is not None:
-            self.sea.begin()
+        if self.disturbances is not None:
+            self.disturbances.begin()
 
     def step(self, actions: Mapping[str, Any]) -> tuple[Any, ...]:
         """One step of the game, with its shields and conditions."""
@@ -84,8 +84,8 @@ class Shielding:
 
     def _wanted(self, core: BatchedMctf, commands: Array) -> Array:
         """Stands before the shields."""
-        if self.sea is not None:
-            self.sea.look(core)
+        if self.disturbances is not None:
+            self.disturbances.look(core)
         self._commands = commands.copy()
         return commands
 
@@ -93,7 +93,7 @@ class Shielding:
         """Stands behind them."""
         if self._listener is not None and self._commands is not None:
             self._listener(self._commands, commands)
-        return commands if self.sea is None else self.sea.carry(core, commands)
+        return commands if self.disturbances is None else self.disturbances.carry(core, commands)
 
     def read(self) -> Seen:
         """Collect what the shields decided last."""
@@ -125,7 +125,7 @@ def shield_game(env: MctfEnv, spec: MatchSpec) -> Shielding:
     logging.getLogger(game_facts.__name__).setLevel(logging.ERROR)
     shielding = Shielding(env, env)
     if not spec.conditions.calm:
-        shielding.sea = Sea(env, spec.conditions, spec.seed, spec.own_team)
+        shielding.disturbances = Disturbances(env, spec.conditions, spec.seed, spec.own_team)
     for side, settings in _settings_by_side(spec).items():
         if settings is not None:
             told = spec.conditions if side == spec.side else replace(spec.conditions, delay_s=0.0)
@@ -143,7 +143,7 @@ def _settings_by_side(spec: MatchSpec) -> dict[str, Mapping[str, Any] | None]:
 
 def _add(shielding: Shielding, side: str, settings: Mapping[str, Any], shield_autopilot: bool) -> None:
     config = ShieldConfig.of(**{"dt_s": shielding.inner.config.dt_s, "separation_m": RADII_M[0], **settings})
-    reader = None if shielding.sea is None else shielding.sea.reader()
+    reader = None if shielding.disturbances is None else shielding.disturbances.reader()
     wrapped = ShieldedParallelEnv(shielding.env, Shield(config), side, shield_autopilot, reader=reader)
     shielding.env = wrapped
     shielding.wrappers.append(wrapped)

@@ -11,7 +11,7 @@ from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
 from steerclear.env.mctf import MctfEnv
 from steerclear.experiments.play.openings import opening
-from steerclear.experiments.play.seat import Seat
+from steerclear.experiments.play.policy_runner import PolicyRunner
 from steerclear.policies.registry import ENTRIES
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array
@@ -107,14 +107,15 @@ class Game:
         self.core = self.env.core
         self.players = dict(players)
         self._seed = seed
-        self._seats: list[Seat] = []
+        self._seats: list[PolicyRunner] = []
         for name in dict.fromkeys(players.values()):
             if name not in ENTRIES:
                 raise ConfigError(f"simulated boats play scripted policies only, not {name!r}: {', '.join(ENTRIES)}")
             for team in (0, 1):
                 boats = [i for i, other in players.items() if other == name and self.core.team[i] == team]
                 if boats:
-                    self._seats.append(Seat(policies.make(name), self.env, [config.agent_ids[i] for i in boats]))
+                    ids = [config.agent_ids[i] for i in boats]
+                    self._seats.append(PolicyRunner(policies.make(name), self.env, ids))
 
     def start(self, states: Sequence[Array]) -> None:
         """Begin with the boats where they are, (N_STATE,) each."""

@@ -9,7 +9,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 from steerclear.env.config import GameConfig
 from steerclear.shield.exceptions import ConfigError
 
-from ..play.kept_distance import check_shield
+from ..play.spec import check_shield
 
 SELF = "self"
 """Among opponents: snapshots of the learner."""

@@ -190,6 +190,30 @@ def test_goals_judge_pairs_of_all_pairings(played):
     assert goals([{**row, "captures": 0} for row in rows])[2]["met"] is None
 
 
+def test_hits_of_boats_that_the_game_drives_stand_beside_the_goals_and_miss_none(played):
+    """Nothing on board can prevent them: tagged boats and those out of bounds obey the game."""
+    rows = [
+        {
+            **hits(row, 10, 3),
+            "breaches_teammate_2.5m": 2 if row["shielded"] else 0,
+            "breaches_driven_teammate_2.5m": 2 if row["shielded"] else 0,
+            "breaches_driven_opponent_2.5m": 2 if row["shielded"] else 0,
+        }
+        for row in played.rows
+    ]
+    mates, opponents = goals(rows)[:2]
+    assert (mates["value"], mates["met"], mates["note"]) == (0.0, True, "beside 8 of boats that the game drives")
+    assert (opponents["value"], opponents["met"]) == (pytest.approx(0.1), True)
+    assert "of boats the team commands" in mates["name"]
+    shown = " ".join(printed(goals_table([mates]), 100).split())
+    assert "(beside 8 of boats that the game drives)" in shown
+    assert "8 of boats that the game drives" in goals_lines([mates])[2]
+    assert "8 of boats that the game drives" in goal_rows([mates])[0]["name"]
+    one_more = [{**row, "breaches_teammate_2.5m": row["breaches_teammate_2.5m"] + row["shielded"]} for row in rows]
+    assert (goals(one_more)[0]["value"], goals(one_more)[0]["met"]) == (4.0, False)
+    assert all("note" not in goal for goal in goals(played.rows)), "none is driven in three seconds"
+
+
 def test_results_are_written_whole_and_documented(played, tmp_path):
     results = results_of(played, SETTINGS)
     entry, records = replay_of(played.table, SETTINGS.specs(), 2.5, 1)
@@ -210,7 +234,7 @@ def test_results_are_written_whole_and_documented(played, tmp_path):
     (page,) = (path for path in write_pages([content], tmp_path) if path.name == "ablation_aamas2024.md")
     text = page.read_text()
     assert f"| tags | {interval_text(content['pairings'][0]['metrics']['tags']['off'])} |" in text
-    assert "| hits with opponents at 2.5 m, on / off |" in text
+    assert "| hits with opponents at 2.5 m, of boats the team commands, on / off |" in text
     assert (tmp_path / "ablation_aamas2024.png").read_bytes()[1:4] == b"PNG"
 
 

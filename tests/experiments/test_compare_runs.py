@@ -5,8 +5,8 @@ import math
 
 import pytest
 from steerclear.experiments.cli import app
-from steerclear.experiments.commands.console import ExitCode
 from steerclear.experiments.compare_runs import compare_runs, differs, read_run
+from steerclear.experiments.console import ExitCode
 from steerclear.experiments.docs_keys import COMPARE, undocumented
 from steerclear.experiments.result_files import write_json
 from steerclear.experiments.runner import append_row, job_id

@@ -10,11 +10,10 @@ from mutants import as_json, other_arrays, torn
 from steerclear.env.record import save
 from steerclear.env.trace import load_trace
 from steerclear.experiments import cli
-from steerclear.experiments.commands.console import ExitCode
-from steerclear.experiments.reach.played_sets import PlayedSet
-from steerclear.experiments.reach.played_sets_page import content_of as played_content
-from steerclear.experiments.reach.unsafe_sets import SetPair
-from steerclear.experiments.reach.unsafe_sets_page import content_of as sets_content
+from steerclear.experiments.console import ExitCode
+from steerclear.experiments.provenance import head_of
+from steerclear.experiments.reach.pages import played_content, sets_content
+from steerclear.experiments.reach.sets import PlayedSet, SetPair
 from test_report import results as _report_results
 from typer.testing import CliRunner
 
@@ -44,7 +43,7 @@ def sets():
     settings = {"own": "heron", "other": "heron", "radius_m": 2.5, "shield": {"dt_s": 0.1}}
     pairs = [SetPair(2.0, 2.0, 180.0, *(4.0 for _ in range(len(SetPair.__dataclass_fields__) - 3)))]
     played = [PlayedSet(2.0, 2.0, 180.0, *(4 for _ in range(len(PlayedSet.__dataclass_fields__) - 3)))]
-    return sets_content(settings, pairs, True, 1.0), played_content(settings, played, 1.0)
+    return sets_content(settings, pairs, True, 1.0), played_content(head_of("reach-play", settings, 0.0), played)
 
 
 @pytest.fixture

@@ -2,40 +2,42 @@
 
 import json
 
+import numpy as np
 import pytest
+from steerclear.env.record import read_meta
 from steerclear.experiments import docs_keys, metrics
-from steerclear.experiments.ablation import pairings_of
+from steerclear.experiments.ablation import AblationSettings, results_of, write_results
 from steerclear.experiments.metrics import Goal, Metric, check, game_metrics_of, meanings_of
-from steerclear.experiments.report import Report, Section, Table, write_report
+from steerclear.experiments.report import Report, Section, Table
 from steerclear.experiments.runner import Experiment, execute
-from steerclear.experiments.statistics import as_figure, count_interval, summarise
+from steerclear.experiments.statistics import as_figure, count_interval, mean_interval, summarise
 from steerclear.experiments.tables import interval_text, pairing_table
 from steerclear.shield.decision import Reason
 from steerclear.shield.exceptions import ConfigError
-from test_ablation import printed, row
+from test_ablation import printed
 
 
-def test_a_metric_of_one_line_reaches_table_report_and_keys(monkeypatch, tmp_path):
-    """Its column is in the rows; tables, report and the page of keys follow."""
-    import pandas as pd
+def slowest_mps(record, side):
+    """As CONTRIBUTING has it: from a game's record and a team to the column."""
+    return float(record["speed_mps"][:, np.asarray(read_meta(record)["team"]) == side].min())
 
-    near = Metric("near_misses", "count", "near misses", "", "entries into 1.5 times the radius")
-    known = metrics.game_metrics_of
-    monkeypatch.setattr("steerclear.experiments.ablation.game_metrics_of", lambda radii: [*known(radii), near])
-    monkeypatch.setattr("steerclear.experiments.report.game_metrics_of", lambda: [*known(), near])
-    rows = [row(game, state, near_misses=3 - 2 * state, seed=game) for game in range(4) for state in (False, True)]
-    (summary,) = pairings_of(pd.DataFrame(rows), (2.5, 4.0))
-    limits = count_interval(12, 4)
-    figures = summary["metrics"]["near_misses"]
-    assert figures["off"] == {"value": limits.value, "low": limits.low, "high": limits.high, "n": 4}
-    assert figures["difference"]["value"] == -2.0
-    assert "near misses" in printed(pairing_table(summary), 80)
-    results = {"settings": {}, "versions": {}, "pairings": [summary], "games": rows}
-    page = write_report(results, tmp_path / "report.html").read_text()
-    assert "entries into 1.5 times the radius" in page
-    assert interval_text(figures["off"]) in page
-    content = {"pairings": [{"metrics": {"near_misses": figures}}]}
-    assert docs_keys.undocumented(json.loads(json.dumps(content)), docs_keys.RESULTS) == []
+
+def test_a_metric_of_one_line_reaches_rows_table_report_and_keys(monkeypatch, tmp_path):
+    line = Metric("slowest_mps", "mean", "slowest, m/s", "m/s", "lowest speed of an own boat", measure=slowest_mps)
+    monkeypatch.setattr(metrics, "OWN", (line,))
+    settings = AblationSettings(opponents=("hold",), games=2, rules={"max_time_s": 1.0})
+    run = execute(settings.experiment("ablate"), tmp_path)
+    results = results_of(run, settings)
+    figures = results["pairings"][0]["metrics"]["slowest_mps"]
+    assert figures["off"]["value"] == pytest.approx(mean_interval([row["slowest_mps"] for row in run.rows[::2]]).value)
+    assert {"off", "on", "difference"} <= set(figures)
+    assert "slowest, m/s" in printed(pairing_table(results["pairings"][0]), 80)
+    write_results(run, results)
+    page = (tmp_path / "report.html").read_text()
+    assert "lowest speed of an own boat" in page
+    assert interval_text(figures["on"]) in page
+    content = json.loads((tmp_path / "results.json").read_text())
+    assert docs_keys.undocumented({"pairings": content["pairings"]}, docs_keys.RESULTS) == []
 
 
 THROWS = [Metric("hit", "share", "hits", "", "whether it hit"), Metric("off_m", "mean", "off by", "m", "distance")]

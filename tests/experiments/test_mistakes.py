@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from steerclear.env.record import save
 from steerclear.experiments import cli
-from steerclear.experiments.commands import train
-from steerclear.experiments.commands.console import ExitCode
+from steerclear.experiments import cli_train as train
+from steerclear.experiments.console import ExitCode
 from steerclear.policies.entrants import learned
 from steerclear.shield.extras import install_command
 from typer.testing import CliRunner

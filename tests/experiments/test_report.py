@@ -1,4 +1,3 @@
-import copy
 import math
 import re
 from xml.etree import ElementTree
@@ -7,7 +6,6 @@ import pytest
 from steerclear.experiments import plots
 from steerclear.experiments.metrics import REASONS
 from steerclear.experiments.report import write_report
-from steerclear.shield.exceptions import ConfigError
 
 NAMES = ("captures", "closest_m", "changed_share", "breaches_teammate_2.5m", "breaches_opponent_2.5m", "tags")
 
@@ -145,45 +143,6 @@ def test_what_is_not_needed_may_be_left_out(results, tmp_path):
         del results[name]
     text = write_report(results, tmp_path / "report.html").read_text()
     assert "verdict" not in text.split("</style>")[1]
-
-
-@pytest.mark.parametrize(
-    ("place", "words"),
-    [
-        (("settings",), "lack settings;"),
-        (("games",), "lack games;"),
-        (("pairings", 1, "reasons"), r"lack pairings\[1\]\.reasons"),
-        (("pairings", 0, "metrics", "captures"), r"pairings\[0\]\.metrics\.captures"),
-        (("pairings", 0, "metrics", "breaches_opponent_2.5m"), r"metrics\.breaches_opponent_2\.5m"),
-        (("games", 2, "closest_m"), r"games\[2\]\.closest_m"),
-    ],
-)
-def test_what_is_missing_is_named(results, tmp_path, place, words):
-    broken = copy.deepcopy({name: value for name, value in results.items() if name != "something new"})
-    inside = broken
-    for key in place[:-1]:
-        inside = inside[key]
-    del inside[place[-1]]
-    with pytest.raises(ConfigError, match=rf"{words}.*pass what `steerclear ablate` writes"):
-        write_report(broken, tmp_path / "report.html")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_long_lists_of_what_is_missing_are_cut(results, tmp_path):
-    for row in results["games"]:
-        row.clear()
-    with pytest.raises(ConfigError, match="and 27 more;"):
-        write_report(results, tmp_path / "report.html")
-
-
-def test_nothing_to_report(results, tmp_path):
-    with pytest.raises(ConfigError, match="lack any pairing"):
-        write_report({**results, "pairings": []}, tmp_path / "report.html")
-
-
-def test_another_separation_needs_its_own_figures(results, tmp_path):
-    with pytest.raises(ConfigError, match=r"breaches_teammate_4\.0m"):
-        write_report({**results, "settings": {"shield": {"separation_m": 4.0}}}, tmp_path / "report.html")
 
 
 def test_plots_without_data_and_with_long_labels_are_still_plots():

@@ -306,7 +306,7 @@ def test_the_digest_of_the_code_changes_with_sources_tables_and_versions(tmp_pat
         write(name, "2")
         seen.append(digest())
     assert len(set(seen)) == 8
-    for name in ("experiments/commands/words.py", "experiments/report.py", "shield/bridge/loop.py"):
+    for name in ("experiments/cli_words.py", "experiments/report.py", "shield/bridge/loop.py"):
         write(name, "3")
         assert digest() == seen[-1], "what only shows results changes none"
     monkeypatch.setattr(provenance, "versions", lambda: {"numpy": "0"})

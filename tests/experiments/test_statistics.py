@@ -151,7 +151,6 @@ def test_means_of_games_that_are_all_alike_have_no_limits_and_differences_of_cou
         (lambda: count_ratio_interval(1, -1), "counts >= 0"),
         (lambda: count_difference([1], [1, 2]), "1 off and 2 on"),
         (lambda: count_interval(1, float("nan")), "exposure > 0"),
-        (lambda: mean_interval([1.0, 2.0], confidence=1.0), "between 0 and 1"),
         (lambda: paired_difference([1.0], [1.0, 2.0]), "1 off and 2 on"),
     ],
 )

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from rich.table import Table
 from rich.text import Text
 from steerclear.experiments import cli, markdown, page, plots
-from steerclear.experiments.commands.console import ExitCode, err, out
+from steerclear.experiments.console import ExitCode, err, out
 from steerclear.experiments.faults import fault_words, machine_words
 from steerclear.experiments.tables import titled
 from steerclear.experiments.terminal import SafeConsole, SafeFormatter, plain
@@ -107,7 +107,7 @@ SAY = """
 import sys
 from steerclear.experiments.terminal import prepare
 prepare()
-from steerclear.experiments.commands.console import out, err
+from steerclear.experiments.console import out, err
 from steerclear.experiments.tables import titled
 for console in (out(), err()):
     console.print(titled("54° → ⚑", ["", "≥"], [["\\u2800\\u28ff", "\\ud800…"]]))
@@ -171,9 +171,9 @@ def fails(error):
 
 @pytest.mark.parametrize("error", [RuntimeError("a\nb \x1b[2J"), KeyError("x"), RecursionError(), AssertionError()])
 def test_what_nobody_foresaw_is_one_line_and_a_file(error, monkeypatch):
-    monkeypatch.setattr("steerclear.experiments.commands.evaluate.run_games", fails(error))
-    monkeypatch.setattr("steerclear.experiments.commands.evaluate.AblationSettings", fails(error))
-    monkeypatch.setattr("steerclear.experiments.commands.evaluate.o.split_names", lambda *_: fails(error)(""))
+    monkeypatch.setattr("steerclear.experiments.cli_games.run_games", fails(error))
+    monkeypatch.setattr("steerclear.experiments.cli_games.AblationSettings", fails(error))
+    monkeypatch.setattr("steerclear.experiments.cli_games.o.split_names", lambda *_: fails(error)(""))
     done = CliRunner().invoke(cli.app, ["evaluate", "medium"])
     assert done.exit_code == ExitCode.FAULT == 70
     assert done.stderr.count("\n") == 1
@@ -189,7 +189,7 @@ def test_what_nobody_foresaw_is_one_line_and_a_file(error, monkeypatch):
     [(OSError(28, "No space left on device", "/a"), "free some space"), (MemoryError(), "not enough memory")],
 )
 def test_what_the_machine_refuses_is_no_fault(error, words, monkeypatch):
-    monkeypatch.setattr("steerclear.experiments.commands.evaluate.o.split_names", lambda *_: fails(error)(""))
+    monkeypatch.setattr("steerclear.experiments.cli_games.o.split_names", lambda *_: fails(error)(""))
     done = CliRunner().invoke(cli.app, ["evaluate", "medium"])
     assert done.exit_code == ExitCode.BAD_INPUT
     assert words in done.stderr

@@ -6,7 +6,7 @@ import pytest
 from steerclear import policies
 from steerclear.env.mctf import MctfEnv
 from steerclear.experiments import cli
-from steerclear.experiments.commands.console import ExitCode
+from steerclear.experiments.console import ExitCode
 from steerclear.experiments.entries.team import is_entry
 from steerclear.policies.own import own_code
 from steerclear.shield.exceptions import PolicyError

@@ -4,7 +4,7 @@ import io
 
 import pytest
 from rich.console import Console
-from steerclear.experiments.commands.deploying import show_check
+from steerclear.experiments.cli_boats import show_check
 from steerclear.shield.bridge.preflight_checks import CheckResult
 
 

@@ -113,7 +113,7 @@ def test_a_closed_stream_ends_the_process_in_order(monkeypatch):
 @pytest.mark.parametrize("option", ["--policy", "--opponents"])
 def test_an_unknown_policy_is_refused_before_boats_are_simulated(option, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("steerclear.experiments.commands.deploy.Demo", None)
+    monkeypatch.setattr("steerclear.experiments.cli_boats.Demo", None)
     told = CliRunner().invoke(cli.app, ["deploy", "--demo", option, "medum"])
     assert told.exit_code == 2
     assert "did you mean medium" in " ".join(told.output.split())
@@ -126,7 +126,7 @@ def test_an_unknown_policy_is_refused_before_boats_are_simulated(option, monkeyp
 )
 def test_waits_and_speeds_out_of_range_are_refused_at_once(command, option, value, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("steerclear.experiments.commands.deploy.Demo", None)
+    monkeypatch.setattr("steerclear.experiments.cli_boats.Demo", None)
     told = CliRunner().invoke(cli.app, [*command, option, value])
     assert told.exit_code == 2
     assert f"give {option} more than 0" in " ".join(told.output.split())

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from steerclear.experiments.commands.sea_trial import next_words
+from steerclear.experiments.cli_boats import next_words
 from steerclear.experiments.deploy.sea_trial import MANOEUVRES, SeaTrial, longest_s
 from steerclear.experiments.fit.runs import NEEDED, Streams, untold
 from steerclear.shield.bridge.fleet_file import parse_fleet

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from steerclear.experiments import cli
 from steerclear.experiments import docs_keys as keys
-from steerclear.experiments.commands.console import ExitCode
+from steerclear.experiments.console import ExitCode
 from steerclear.experiments.encounters import play
 from steerclear.experiments.encounters.attack import N_GENES, Search, _Hunt, run_search
 from steerclear.experiments.encounters.outcomes import NO_VERDICT, SIDES, measure_chunk

@@ -9,7 +9,7 @@ from rich.console import Console
 from steerclear.env.record import read_meta, validate
 from steerclear.experiments import cli
 from steerclear.experiments import docs_keys as keys
-from steerclear.experiments.commands.console import ExitCode
+from steerclear.experiments.console import ExitCode
 from steerclear.experiments.encounters import Conditions, draw, play, results
 from steerclear.experiments.encounters.replay import record_of, records_of
 from steerclear.experiments.encounters.report import MOST_M, cells_table, distribution

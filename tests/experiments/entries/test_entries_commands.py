@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from steerclear.experiments import cli
-from steerclear.experiments.commands.console import ExitCode
+from steerclear.experiments.console import ExitCode
 from typer.testing import CliRunner
 
 TINY = ["--games", "1", "--max-time", "1", "--jobs", "1", "--judge", "none"]

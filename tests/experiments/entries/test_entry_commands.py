@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 from steerclear.experiments import cli
-from steerclear.experiments.commands.console import ExitCode
-from steerclear.experiments.commands.entry import time_text
+from steerclear.experiments.cli_entry import time_text
+from steerclear.experiments.console import ExitCode
 from steerclear.experiments.docs_keys import KEYS, undocumented
 from steerclear.experiments.entries.imports import imports_of
 from steerclear.experiments.entries.report_page import EntryGames, games_to_look_at, write_entry_page
@@ -161,10 +161,10 @@ def test_a_report_is_a_page_with_the_games_to_look_at(write_entry):
 
 
 def test_a_report_of_an_entry_that_has_a_shield_or_of_other_rules_plays_no_zip(write_entry, monkeypatch):
-    def played(command, settings, folder, workers, resume, quick):
+    def played(command, settings, where, quick):
         raise PolicyError(f"zip {settings.zip_file!r}, {settings.how_many()}")
 
-    monkeypatch.setattr("steerclear.experiments.commands.entry.run_games", played)
+    monkeypatch.setattr("steerclear.experiments.cli_entry.run_games", played)
     told = run("report", write_entry("return 4"), "--preset", "mctf2025", "--opponents", "hold", "--games", "2").stderr
     assert "zip '', 2 games against hold, without the shield, with it: 4 games in all" in told.replace("\n", " ")
 
@@ -173,11 +173,11 @@ def test_a_report_of_an_entry_that_has_a_shield_or_of_other_rules_plays_no_zip(w
 def test_a_report_takes_all_cores_where_nobody_says_how_many(jobs, processes, write_entry, monkeypatch):
     entry, asked = write_entry("return (1.5, 10.0)"), []
 
-    def played(command, settings, folder, workers, resume, quick):
-        asked.append(workers)
+    def played(command, settings, where, quick):
+        asked.append(where.workers())
         raise PolicyError("that is all")
 
-    monkeypatch.setattr("steerclear.experiments.commands.entry.run_games", played)
+    monkeypatch.setattr("steerclear.experiments.cli_entry.run_games", played)
     assert "that is all" in run("report", entry, *jobs).stderr
     assert asked == [processes]
 

@@ -17,7 +17,7 @@ from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
 from steerclear.experiments import cli
-from steerclear.experiments.commands.console import ExitCode
+from steerclear.experiments.console import ExitCode
 from steerclear.experiments.docs_keys import KEYS, undocumented
 from steerclear.experiments.entries.onboard.state import GameSpec
 from steerclear.experiments.entries.onboard.team_shield import ShieldedTeam, _tuples

@@ -9,7 +9,7 @@ import pytest
 from steerclear.experiments import cli
 from steerclear.experiments import docs_keys as keys
 from steerclear.experiments.ablation import AblationSettings
-from steerclear.experiments.commands.console import ExitCode
+from steerclear.experiments.console import ExitCode
 from steerclear.experiments.docs import write_pages
 from steerclear.experiments.play.conditions import CALM, Conditions, draw, words_of, words_of_settings
 from steerclear.experiments.play.spec import MatchSpec

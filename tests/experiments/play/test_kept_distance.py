@@ -3,8 +3,8 @@
 import pytest
 from steerclear.env.config import GameConfig
 from steerclear.experiments.cli import app
-from steerclear.experiments.commands.options import with_distance
-from steerclear.experiments.play.kept_distance import check_shield, counted_m, words_of_less
+from steerclear.experiments.cli_options import with_distance
+from steerclear.experiments.play.spec import check_shield, counted_m, words_of_less
 from steerclear.shield.exceptions import ConfigError
 from typer.testing import CliRunner
 

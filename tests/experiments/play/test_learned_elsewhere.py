@@ -7,7 +7,7 @@ import pytest
 from steerclear.env.config import GameConfig
 from steerclear.experiments.cli import app
 from steerclear.experiments.deploy.demo import demo_file
-from steerclear.experiments.play.learned_elsewhere import words_of_elsewhere
+from steerclear.experiments.policy_checks import words_of_elsewhere
 from steerclear.policies.entrants.learned.entered import FILES
 from steerclear.policies.entrants.learned.sb3_file import add_card
 from steerclear.shield.exceptions import ConfigError, PolicyError
@@ -79,7 +79,7 @@ def test_deploy_says_it_before_boats_are_spoken_to(weights, tmp_path, monkeypatc
     def begun(*arguments):
         raise ConfigError("boats would be spoken to now")
 
-    monkeypatch.setattr("steerclear.experiments.commands.deploy.run_boats", begun)
+    monkeypatch.setattr("steerclear.experiments.cli_boats.run_boats", begun)
     file = demo_file(tmp_path)
     file.write_text(file.read_text().replace("preset: aamas2024", "preset: mctf2025"))
     result = CliRunner().invoke(app, ["deploy", str(file), "--policy", weights])

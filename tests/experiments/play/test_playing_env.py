@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from steerclear import policies
 from steerclear.env.record import GameRecorder
-from steerclear.experiments.play import match, tape
+from steerclear.experiments.play import match, recorder
 from steerclear.experiments.play.match import Match
-from steerclear.experiments.play.playing_env import PlayingEnv, live_view, read_infos
+from steerclear.experiments.play.recorder import PlayingEnv, live_view, read_infos
 from steerclear.experiments.play.spec import MatchSpec
 from steerclear.policies.entrants.play import EntrantTeam
 
@@ -50,7 +50,7 @@ def test_a_policy_that_reads_infos_gets_them_in_a_match():
 
 
 class Recorded:
-    """The recorder of the library, in the place of a match's tape."""
+    """The recorder of the library, in the place of a match's recorder."""
 
     def __init__(self, game, meta):
         self._game, self._recorder = game, GameRecorder()
@@ -62,10 +62,10 @@ class Recorded:
 
 
 def test_a_record_is_the_same_with_infos_and_by_the_library(monkeypatch):
-    monkeypatch.setattr(tape, "FIRST_ROWS", 2)  # so that it has to make room
+    monkeypatch.setattr(recorder, "FIRST_ROWS", 2)  # so that it has to make room
     lean = match.play_match(SPEC).record
     monkeypatch.setattr(match, "read_infos", lambda teams: True)
-    monkeypatch.setattr(match, "Tape", Recorded)
+    monkeypatch.setattr(match, "Recorder", Recorded)
     whole = match.play_match(SPEC).record
     assert set(lean) == set(whole)
     for name in lean:

@@ -7,7 +7,7 @@ import pytest
 from steerclear.env.record import read_meta
 from steerclear.env.render import Arena, Picture, Scene
 from steerclear.env.render.boats import boats_in_breach
-from steerclear.experiments.commands.play import STEERING
+from steerclear.experiments.cli_games import STEERING
 from steerclear.experiments.play.match import Match
 from steerclear.experiments.play.spec import MatchSpec
 from steerclear.policies.keyboard import AHEAD, BACK, LEFT, RIGHT

@@ -8,10 +8,9 @@ import pytest
 from steerclear.experiments import cli
 from steerclear.experiments.docs import write_pages
 from steerclear.experiments.docs_keys import PLAYED_SETS, undocumented
-from steerclear.experiments.reach import played_sets, unsafe_sets
-from steerclear.experiments.reach.played_sets import PlayedSet, duels_lost, games_lost, play_set, tasks_of
-from steerclear.experiments.reach.played_sets_page import HEADS, goals_of_sets, rows_of
-from steerclear.experiments.reach.unsafe_sets import RATIO_BAR, values_m
+from steerclear.experiments.reach import sets
+from steerclear.experiments.reach.pages import PLAYED_HEADS, played_goals, played_rows
+from steerclear.experiments.reach.sets import RATIO_GOAL, PlayedSet, duels_lost, games_lost, play_job, values_m
 from steerclear.shield import ShieldConfig
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
@@ -33,11 +32,11 @@ def heron():
 @pytest.fixture
 def few(monkeypatch):
     """One pair of speeds, one heading, few positions and short games, all in this process."""
-    monkeypatch.setattr(unsafe_sets, "HEADINGS_DEG", (180.0,))
-    monkeypatch.setattr(unsafe_sets, "SPEED_SHARES", ((1.0, 1.0),))
-    monkeypatch.setattr(played_sets, "RINGS", 40)
-    monkeypatch.setattr(played_sets, "BEARINGS", 12)
-    monkeypatch.setattr(played_sets, "LONGEST_S", 6.0)
+    monkeypatch.setattr(sets, "HEADINGS_DEG", (180.0,))
+    monkeypatch.setattr(sets, "SPEED_SHARES", ((1.0, 1.0),))
+    monkeypatch.setattr(sets, "PLAYED_RANGES", 40)
+    monkeypatch.setattr(sets, "PLAYED_BEARINGS", 12)
+    monkeypatch.setattr(sets, "LONGEST_S", 6.0)
 
 
 def meeting(*places):
@@ -47,6 +46,11 @@ def meeting(*places):
     state = np.tile(np.stack([own, other]), (len(places), 1, 1))
     state[:, 1, : L.Y + 1] = places
     return state
+
+
+def play_head_on():
+    job = {"own": "heron", "other": "heron", "radius_m": RADIUS_M, "shield": {}, "place": HEAD_ON}
+    return PlayedSet(**play_job(job)[0])
 
 
 def play(*arguments):
@@ -70,7 +74,7 @@ def test_so_is_a_boat_that_the_table_steers(heron):
 @pytest.fixture
 def no_duels(monkeypatch):
     """Nothing lost by the table itself, at once."""
-    monkeypatch.setattr(played_sets, "duels_lost", lambda values, start, *_: np.zeros(len(start), bool))
+    monkeypatch.setattr(sets, "duels_lost", lambda values, start, *_: np.zeros(len(start), bool))
 
 
 def test_a_shield_that_fears_nobody_loses_more(heron):
@@ -80,10 +84,10 @@ def test_a_shield_that_fears_nobody_loses_more(heron):
 
 
 def test_the_area_of_the_reachability_set_is_the_tables_own(heron, few, no_duels, monkeypatch):
-    monkeypatch.setattr(played_sets, "RINGS", 200)
-    monkeypatch.setattr(played_sets, "BEARINGS", 72)
-    monkeypatch.setattr(played_sets, "games_lost", lambda values, config, start, *_: np.zeros(len(start), bool))
-    one = play_set(tasks_of("heron", "heron", RADIUS_M, {}, [HEAD_ON])[0])
+    monkeypatch.setattr(sets, "PLAYED_RANGES", 200)
+    monkeypatch.setattr(sets, "PLAYED_BEARINGS", 72)
+    monkeypatch.setattr(sets, "games_lost", lambda values, config, start, *_: np.zeros(len(start), bool))
+    one = play_head_on()
     assert one.reach_m2 == pytest.approx(area_m2(heron, RADIUS_M, *HEAD_ON), rel=0.02)
     assert (one.lost_m2, one.ratio) == (0.0, 1.0)
 
@@ -96,18 +100,18 @@ def test_positions_beyond_are_tried_on_all_bearings(heron, no_duels, monkeypatch
         bearing = np.arctan2(start[:, 1, L.X], start[:, 1, L.Y]) % (2.0 * math.pi)
         return (bearing * 3.0 / math.pi).astype(int) == sector
 
-    monkeypatch.setattr(played_sets, "games_lost", in_sector)
-    one = play_set(tasks_of("heron", "heron", RADIUS_M, {}, [HEAD_ON])[0])
+    monkeypatch.setattr(sets, "games_lost", in_sector)
+    one = play_head_on()
     assert one.tried > 50
     assert one.tried_lost / one.tried == pytest.approx(1.0 / 6.0, abs=0.06)
 
 
 def test_all_that_is_lost_beside_the_reachability_set_counts_by_its_area(heron, few, no_duels, monkeypatch):
-    monkeypatch.setattr(played_sets, "RINGS", 200)
-    monkeypatch.setattr(played_sets, "BEARINGS", 72)
-    monkeypatch.setattr(played_sets, "games_lost", lambda values, config, start, *_: np.ones(len(start), bool))
-    one = play_set(tasks_of("heron", "heron", RADIUS_M, {}, [HEAD_ON])[0])
-    wider = area_m2(heron, RADIUS_M + played_sets.BAND_M, *HEAD_ON)
+    monkeypatch.setattr(sets, "PLAYED_RANGES", 200)
+    monkeypatch.setattr(sets, "PLAYED_BEARINGS", 72)
+    monkeypatch.setattr(sets, "games_lost", lambda values, config, start, *_: np.ones(len(start), bool))
+    one = play_head_on()
+    wider = area_m2(heron, RADIUS_M + sets.BAND_M, *HEAD_ON)
     assert one.reach_m2 + one.lost_m2 == pytest.approx(wider, rel=0.03)
     assert one.tried_lost == one.tried > 0
 
@@ -155,8 +159,8 @@ def test_the_worst_row_is_judged():
     fine, large, beyond = (
         PlayedSet(2.0, 2.0, 0.0, 30.0, lost_m2, 3.0, 100, 50, lost) for lost_m2, lost in ((1.0, 0), (6.0, 0), (1.0, 1))
     )
-    assert [bar["met"] for bar in goals_of_sets([fine])] == [True, True]
-    assert [(bar["met"], bar["limit"]) for bar in goals_of_sets([fine, large])] == [(False, RATIO_BAR), (True, 0.0)]
-    assert [bar["met"] for bar in goals_of_sets([fine, beyond])] == [True, False]
-    row = dict(zip(HEADS, rows_of([large])[0], strict=True))
+    assert [bar["met"] for bar in played_goals([fine])] == [True, True]
+    assert [(bar["met"], bar["limit"]) for bar in played_goals([fine, large])] == [(False, RATIO_GOAL), (True, 0.0)]
+    assert [bar["met"] for bar in played_goals([fine, beyond])] == [True, False]
+    row = dict(zip(PLAYED_HEADS, played_rows([large])[0], strict=True))
     assert (row["ratio"], row["by table"], row["lost beyond"]) == ("1.20", "1.10", "0 of 50")

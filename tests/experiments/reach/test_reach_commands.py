@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import pytest
 from steerclear.experiments import cli
-from steerclear.experiments.commands import reach
-from steerclear.experiments.commands.console import ExitCode
+from steerclear.experiments import cli_reach as reach
+from steerclear.experiments.console import ExitCode
 from steerclear.experiments.docs import write_pages
-from steerclear.experiments.reach.show import draw_sets, tables_page
+from steerclear.experiments.reach.pages import draw_sets, tables_page
 from steerclear.shield.exceptions import ConfigError, TableError
 from steerclear.shield.tables import make
 from steerclear.shield.tables.files import CACHE_VARIABLE, SHIPPED, read_table, save_table

@@ -8,16 +8,16 @@ import pytest
 from steerclear.experiments import cli
 from steerclear.experiments.docs import write_pages
 from steerclear.experiments.docs_keys import SETS, undocumented
-from steerclear.experiments.reach import unsafe_sets
-from steerclear.experiments.reach.unsafe_sets import (
-    MISSED_PERCENT_BAR,
-    RATIO_BAR,
+from steerclear.experiments.reach import sets
+from steerclear.experiments.reach.pages import SETS_HEADS, sets_content, sets_goals, sets_rows
+from steerclear.experiments.reach.sets import (
+    MISSED_PERCENT_GOAL,
+    RATIO_GOAL,
     SetPair,
     compare_pair,
     compare_sets,
     sets_config,
 )
-from steerclear.experiments.reach.unsafe_sets_page import HEADS, content_of, rows_of, sets_goals
 from steerclear.shield import ShieldConfig
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.tables.areas import area_m2
@@ -37,8 +37,8 @@ def heron():
 @pytest.fixture
 def head_on(monkeypatch):
     """Compares one pair of speeds and one heading only."""
-    monkeypatch.setattr(unsafe_sets, "HEADINGS_DEG", (180.0,))
-    monkeypatch.setattr(unsafe_sets, "SPEED_SHARES", ((1.0, 1.0),))
+    monkeypatch.setattr(sets, "HEADINGS_DEG", (180.0,))
+    monkeypatch.setattr(sets, "SPEED_SHARES", ((1.0, 1.0),))
 
 
 def compare(*arguments):
@@ -63,19 +63,19 @@ def test_opponents_that_only_hold_their_course_leave_a_smaller_set_that_misses_w
     pair = compare_pair(heron, tame, 90.0, 2.0, 2.0)
     assert math.pi * RADIUS_M**2 <= pair.shield_m2 < pair.reach_m2
     assert pair.missed_m2 >= pair.reach_m2 - pair.shield_m2 - 1e-9
-    assert pair.ratio <= RATIO_BAR
+    assert pair.ratio <= RATIO_GOAL
     assert not {bar["name"]: bar["met"] for bar in sets_goals([pair])}["set the shield misses, %, largest"]
 
 
 def test_areas_of_the_same_size_in_other_places_are_seen(heron, monkeypatch):
     """A set as large as the table's, but mirrored, is missed in part: ratios alone would let it pass."""
-    right = unsafe_sets.certificates_m
+    right = sets.certificates_m
 
     def mirrored(state, names, config):
-        return right(state, names, config).reshape(-1, unsafe_sets.BEARINGS)[:, ::-1].ravel()
+        return right(state, names, config).reshape(-1, sets.BEARINGS)[:, ::-1].ravel()
 
     true = compare_pair(heron, BARE, 90.0, 2.0, 2.0)
-    monkeypatch.setattr(unsafe_sets, "certificates_m", mirrored)
+    monkeypatch.setattr(sets, "certificates_m", mirrored)
     false = compare_pair(heron, BARE, 90.0, 2.0, 2.0)
     assert false.shield_m2 == pytest.approx(true.shield_m2)
     assert false.missed_m2 > 0.05 * false.reach_m2 > true.missed_m2
@@ -130,8 +130,8 @@ def test_radii_that_the_table_cannot_tell_are_refused(radius):
 
 
 def test_rows_show_the_ratio_and_what_is_missed():
-    (row,) = rows_of([SetPair(2.0, 1.0, 90.0, 33.0, 30.0, 1.5)])
-    cells = dict(zip(HEADS, row, strict=True))
+    (row,) = sets_rows([SetPair(2.0, 1.0, 90.0, 33.0, 30.0, 1.5)])
+    cells = dict(zip(SETS_HEADS, row, strict=True))
     assert cells["ratio"] == "1.10"
     assert (cells["missed, m²"], cells["missed, %"]) == ("1.50", "5.0")
 
@@ -141,7 +141,7 @@ def test_bars_judge_the_worst_pair():
     assert [bar["met"] for bar in sets_goals([fine])] == [True, True]
     assert [bar["met"] for bar in sets_goals([fine, large])] == [False, True]
     assert [bar["met"] for bar in sets_goals([missing, fine])] == [True, False]
-    assert [bar["limit"] for bar in sets_goals([fine])] == [RATIO_BAR, MISSED_PERCENT_BAR]
+    assert [bar["limit"] for bar in sets_goals([fine])] == [RATIO_GOAL, MISSED_PERCENT_GOAL]
     assert [bar["value"] for bar in sets_goals([large, missing])] == pytest.approx([2.0, 10.0])
 
 
@@ -168,7 +168,7 @@ def test_the_command_writes_documented_json_that_becomes_a_page(tmp_path, head_o
 @pytest.mark.parametrize("pair", [(40.0, 30.0, 0.0), (30.0, 30.0, 1.0)])
 def test_a_bar_that_is_not_met_is_an_exit_status(pair, monkeypatch):
     found = [SetPair(2.0, 2.0, 180.0, *pair)]
-    monkeypatch.setattr("steerclear.experiments.commands.reach_compare.compare_sets", lambda *_: found)
+    monkeypatch.setattr("steerclear.experiments.cli_reach.compare_sets", lambda *_: found)
     assert compare().exit_code == 1
 
 
@@ -180,6 +180,6 @@ def test_results_of_an_older_version_are_refused_with_the_remedy(tmp_path):
 
 
 def test_json_of_a_comparison_has_no_numpy_in_it(heron, head_on):
-    content = content_of(head()["settings"], compare_sets(heron, BARE), False, wall_s=1.0)
+    content = sets_content(head()["settings"], compare_sets(heron, BARE), False, 0.0)
     assert json.loads(json.dumps(content))["pairs"][0]["missed_m2"] >= 0.0
     assert not any(isinstance(value, np.generic) for pair in content["pairs"] for value in pair.values())

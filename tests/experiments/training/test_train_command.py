@@ -4,8 +4,8 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from steerclear.experiments import cli_train as train
 from steerclear.experiments.cli import app
-from steerclear.experiments.commands import train
 from steerclear.experiments.result_files import lock_folder
 from steerclear.policies.submissions.made_for import made_for
 from typer.testing import CliRunner
@@ -45,7 +45,7 @@ def test_train_export_and_play_as_the_page_tells(tiny, tmp_path):
 
 
 def test_a_training_without_a_terminal_tells_how_far_it_is(tiny, tmp_path, monkeypatch):
-    monkeypatch.setattr("steerclear.experiments.commands.plain_progress.EVERY_S", 0.0)
+    monkeypatch.setattr("steerclear.experiments.console.EVERY_S", 0.0)
     first = call("train", tiny(decisions=36), "--out", tmp_path / "run")
     assert first.exit_code == 0
     said = [line for line in first.stderr.splitlines() if line.startswith("decisions: ")]

@@ -1,0 +1,246 @@
+"""Commands about scenes of a few boats: encounters, with any safety filter, and the search for those that breach it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.platforms import get_platform, known_platforms
+from steerclear.shield.platforms.files import is_path
+
+from . import cli_options as o
+from .baselines.registry import NONE, is_shield, parse_guards
+from .console import command, finish, out, progress, say
+from .encounters.attack import MOST_PLAYED, Search, experiment_of, passed, searches_table
+from .encounters.attack import write_all as write_searches
+from .encounters.outcomes import measure_chunk
+from .encounters.replay import record_of
+from .encounters.report import cells_table, heads_legend, write_all
+from .encounters.results import Pair, Settings, results_of
+from .encounters.scenarios import FAMILIES
+from .encounters.scene import Conditions, read_scene
+from .encounters.simulate import play
+from .play.spec import check_count
+from .replay_html import write_replay
+from .result_files import check_new, make_folder
+from .runner import execute
+from .tables import goals_table, number_text, titled
+
+
+@dataclass(frozen=True)
+class SceneOptions:
+    """Conditions of scenes."""
+
+    radius: Annotated[float, o.option("M", "Separation to keep, m.")] = 2.5
+    delay: Annotated[float, o.option("S", "From own command to effect, s, in whole steps, rounded up.")] = 0.0
+    noise: Annotated[float, o.option("M", "Bound on the error of positions seen, m.")] = 0.0
+    current: Annotated[float, o.option("M/S", "Speed of a current; the guard is told it, not where to.")] = 0.0
+
+    def given(self) -> Conditions:
+        """The conditions.
+
+        Raises:
+            ConfigError: one is out of range.
+        """
+        return Conditions(self.radius, self.delay, self.noise, self.current)
+
+
+@dataclass(frozen=True)
+class SceneRunOptions(o.RunOptions):
+    """As of games; processes have two names."""
+
+    jobs: Annotated[int | None, o.option("N", "Processes.", "--workers", "--jobs", default="all cores")] = None
+
+
+@command()
+def encounters(
+    scenes: SceneOptions,
+    where: SceneRunOptions,
+    platform: Annotated[
+        str, o.option("A,B/C", "Platforms: heron, or own/other as heron/surveyor, separated by commas.")
+    ] = "heron,surveyor",
+    family: Annotated[str, o.option("A,B", "Families of encounters, or all.")] = "all",
+    n: Annotated[int, o.option("N", "Encounters per family, platforms and guard.", "--n")] = 1000,
+    guard: Annotated[
+        list[str] | None,
+        o.option("A,B", "none, shield, reach, gatekeeper, pl-cbf (:KEY=VALUE,...), or a textbook.", "--guard"),
+    ] = None,
+    seed: Annotated[int, o.option("N", "Of the scenes, the same for every guard.")] = 0,
+    no_judge: Annotated[bool, o.flag("Do not ask the oracle about breaches.", "--no-judge")] = False,
+    scene: Annotated[list[Path] | None, o.option("FILE", "Play scenes of a file instead.", "--scene")] = None,
+) -> None:
+    """Let boats meet in every way there is; count breaches, judge them, write table, report and replays.
+
+    Exit status: 0 done, 1 a shield did not keep a goal of no breaches, 2 bad input, 130 interrupted.
+    """
+    guards = tuple(dict.fromkeys(name for text in guard or ["shield"] for name in parse_guards(text)))
+    if scene:
+        held = {"--platform": platform != "heron,surveyor", "--family": family != "all", "--n": n != 1000}
+        held |= {f"--{name}": value != getattr(SceneOptions, name) for name, value in vars(scenes).items()}
+        unused = {"--jobs": where.jobs is not None, "--resume": where.resume, "--json": where.json_file is not None}
+        _refuse_beside_scenes({**held, "--seed": seed != 0}, unused)
+        finish(play_scene_files(scene, guards, where.folder, not no_judge))
+        return
+    families = family_names(family)
+    settings = Settings(platform_pairs(platform), families, guards, n, seed, scenes.given(), not no_judge)
+    workers, experiment = where.workers(), settings.experiment()
+    with progress("chunks of encounters", len(experiment.jobs)) as notice:
+        run = execute(experiment, where.folder_of("encounters"), workers, where.resume, notice)
+    results = results_of(run)
+    if results["cells"]:
+        write_all(run, settings, results)
+    if not run.interrupted:
+        _show(results, run.folder)
+        where.copy(results)
+    run.end()
+    finish(not any(goal["met"] is False and goal["limit"] == 0.0 for goal in results["goals"]))
+
+
+def _refuse_beside_scenes(held: dict[str, bool], unused: dict[str, bool]) -> None:
+    """Options of drawn encounters say nothing about scenes: what a scene file holds, and what is for many games.
+
+    Raises:
+        ConfigError: one of them was given.
+    """
+    for given, why in (
+        (held, "a scene file holds its own; leave it out, or edit the file"),
+        (unused, "scenes are played one after another and leave no results; leave it out"),
+    ):
+        named = [option for option, is_given in given.items() if is_given]
+        if named:
+            raise ConfigError(f"{', '.join(named)} beside --scene: {why}")
+
+
+def platform_pairs(text: str) -> tuple[Pair, ...]:
+    """Read ``heron,heron/surveyor`` as pairs of own and other platform.
+
+    Raises:
+        ConfigError: no name, or more than two in a pair.
+    """
+    pairs = tuple(dict.fromkeys(_pair(piece.strip()) for piece in text.split(",") if piece.strip()))
+    if not pairs:
+        raise ConfigError("--platform names no platform; write e.g. heron,surveyor")
+    return pairs
+
+
+def _pair(piece: str) -> Pair:
+    """One pair; a platform may be a file, whose path may have slashes of its own."""
+    if is_path(piece) and Path(piece).is_file():
+        return piece, piece
+    for k in (k for k, letter in enumerate(piece) if letter == "/"):
+        own, other = piece[:k], piece[k + 1 :]
+        if all(name in known_platforms() or (is_path(name) and Path(name).is_file()) for name in (own, other)):
+            return own, other
+    own, _, other = piece.partition("/")
+    if is_path(piece):
+        get_platform(piece)  # says why it cannot be read
+    if not own or "/" in other or piece.endswith("/"):
+        raise ConfigError(f"--platform holds {piece!r}; write a name, a file, or own/other")
+    return own, other or own
+
+
+def family_names(text: str) -> tuple[str, ...]:
+    """Read names of families; ``all`` is every one.
+
+    Raises:
+        ConfigError: no name.
+    """
+    names = tuple(dict.fromkeys(filter(None, (part.strip() for part in text.split(",")))))
+    if not names:
+        raise ConfigError(f"--family names none; write all, or some of {', '.join(FAMILIES)}")
+    return tuple(FAMILIES) if names == ("all",) else names
+
+
+def _show(results: dict[str, Any], folder: Path) -> None:
+    console = out()
+    for table in cells_table(results):
+        console.print(table, "")
+    if results["cells"]:
+        console.print(f"{heads_legend()}\n", style="dim")
+    if results["goals"]:
+        console.print(goals_table(results["goals"]), "")
+    say(*(f"not played: {one['guard']}, {one['family']}: {one['error']}" for one in results["failed"]))
+    say(*(folder / name for name in results["files"].values()))
+
+
+def play_scene_files(paths: Sequence[Path], guards: Sequence[str], folder: Path | None, judge: bool = True) -> bool:
+    """Play every scene of the files with every guard; print a table, write a replay when there is a folder.
+
+    Returns:
+        Whether no shield had an avoidable breach.
+
+    Raises:
+        SteerclearError: a file that is no scene, a guard that cannot be made, or a folder with another replay.
+    """
+    replay = None if folder is None else folder / "replay.html"
+    check_new(replay, "--out")
+    rows, records, avoided = [], [], True
+    for path in paths:
+        scenes, conditions = read_scene(path)
+        for guard in guards:
+            columns = measure_chunk(scenes, guard, conditions, judge)
+            hits = int((columns["breaches_teammate"] + columns["breaches_opponent"]).sum())
+            avoidable = int(columns["avoidable"].sum())
+            rows.append([path.name, guard, number_text(float(columns["closest_m"].min())), f"{hits}", f"{avoidable}"])
+            avoided = avoided and not (avoidable and is_shield(guard))
+            if replay is not None:
+                played, worst = play(scenes, guard, conditions), int(columns["game"][columns["closest_m"].argmin()])
+                records.append(record_of(played, worst, f"{path.stem}, {guard}", guard != NONE))
+    out().print(titled("Scenes", ["file", "guard", "closest, m", "breaches", "avoidable"], rows))
+    if replay is not None:
+        make_folder(replay.parent)
+        say(write_replay(records, replay, title="Scenes"))
+    return avoided
+
+
+@dataclass(frozen=True)
+class SearchOptions:
+    """What is searched for."""
+
+    platform: Annotated[str, o.option("A[/B]", "Own platform, or own/attackers'.")] = "heron"
+    attackers: Annotated[int, o.option("N", "Attackers, 1 to 3.")] = 1
+    own: Annotated[int, o.option("N", "Own boats, 1 to 6.")] = 1
+    guard: Annotated[str, o.option("NAME", "What is attacked, as in encounters.")] = "shield"
+    restarts: Annotated[int, o.option("N", "Searches, each from its own start.")] = 8
+    population: Annotated[int, o.option("N", "Opponents per generation.")] = 64
+    generations: Annotated[int, o.option("N", "Generations per search, at most.")] = 30
+    seed: Annotated[int, o.option("N", "Of the searches.")] = 0
+
+
+@command()
+def attack(
+    what: SearchOptions,
+    scenes: SceneOptions,
+    where: SceneRunOptions,
+    replay: Annotated[list[Path] | None, o.option("FILE", "Play found scenes again instead.", "--replay")] = None,
+) -> None:
+    """Search for opponents that get within the radius although it could be kept; keep what is found as scenes.
+
+    Exit status: 0 done, 1 an avoidable breach with the shield on, 2 bad input, 130 interrupted.
+    """
+    guards = parse_guards(what.guard)
+    if len(guards) != 1:
+        raise ConfigError(f"--guard names {len(guards)} guards; attack one at a time")
+    if replay:
+        finish(play_scene_files(replay, guards, where.folder))
+        return
+    pairs = platform_pairs(what.platform)
+    if len(pairs) != 1:
+        raise ConfigError(f"attack takes one --platform, own or own/attackers', not {len(pairs)}")
+    check_count("--restarts", what.restarts, 1, MOST_PLAYED)
+    boats, sizes = (what.attackers, what.own, guards[0]), (what.population, what.generations)
+    first = Search(*pairs[0], *boats, scenes.given(), what.seed, 0, *sizes)
+    first.duel()
+    workers, folder = where.workers(), where.folder_of("attack")
+    with progress("searches", what.restarts) as notice:
+        run = execute(experiment_of(first, what.restarts), folder, workers, where.resume, notice)
+    results = write_searches(run)
+    if not run.interrupted:
+        out().print(searches_table(results))
+        say(*(folder / name for name in results["files"].values()))
+        where.copy(results)
+    run.end()
+    finish(passed(results))

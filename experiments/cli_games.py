@@ -1,0 +1,433 @@
+"""Commands that play games: play, demonstrate, evaluate, ablate; what they share."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import asdict, dataclass, replace
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from steerclear import policies
+from steerclear.env.config import GameConfig
+from steerclear.env.mctf import MctfEnv
+from steerclear.policies.entrants.demonstrator import BOAT_KEYS, OPTION_KEYS, Demonstrator
+from steerclear.policies.registry import KEYBOARD
+from steerclear.shield.exceptions import ConfigError, PolicyError
+from steerclear.shield.extras import install_command
+
+from . import cli_options as o
+from .ablation import AblationSettings, held_games, replay_of, results_of, write_results
+from .ablation import quick as small_version
+from .cli_files import check_ending
+from .console import command, finish, out, progress, say, warn
+from .game_metrics import check_penalty
+from .metrics import RADII_M
+from .play.conditions import check_current, words_of, words_of_settings
+from .play.match import Match, MatchResult, play_match
+from .play.spec import MatchSpec, check_shield, words_of_less
+from .policy_checks import check_no_keyboard, made_of, try_policies
+from .provenance import head_of
+from .result_files import NEW, write_json, write_table
+from .runner import Run, execute
+from .saving import check_endings, save_record
+from .tables import COVERED_WORDS, covered_table, game_table, goals_table, pairing_table, verdict_table
+from .verdicts import check_judge
+
+FEW_GAMES = 20
+"""Fewer of a pairing give intervals that say little."""
+MOST_GAMES = 100_000
+"""Games of a pairing at most: all are listed before the first is played."""
+QUICK_GAMES, QUICK_TIME_S = 4, 300.0
+HITS_WORDS = (
+    f"A hit is an entry into the radius: one stay within {RADII_M[1]:g} m may hold several\ninto {RADII_M[0]:g} m."
+)
+STEERING = (
+    "you steer the ringed boat, while the window has the keyboard: up or w ahead, left and right or a and d turn, "
+    "down or s back, Shift half speed, no key stop; close the window to end"
+)
+CHOOSING = (
+    f"{', '.join(BOAT_KEYS[:3])} choose a boat; "
+    + ", ".join(f"{key} {name}" for key, name in OPTION_KEYS.items())
+    + "; close the window to end"
+)
+DEMONSTRATED = ("easy", "medium")
+"""Opponents of a demonstration."""
+
+
+@dataclass(frozen=True)
+class PlayerOptions:
+    """Who plays."""
+
+    own: o.Own = "medium"
+    opponent: o.Opponent = "easy"
+    side: o.Side = "blue"
+    shield: o.Shielded = True
+    no_shield_autopilot: o.NoAutopilot = False
+    seed: o.Seed = 0
+
+
+@dataclass(frozen=True)
+class WindowOptions:
+    """How a game is looked at."""
+
+    window: Annotated[bool, o.flag("Show the game in a window.", "--window/--headless")] = False
+    keyboard: Annotated[
+        bool,
+        o.flag("Steer the first own boat with the arrow keys, as --own keyboard does (a window opens).", "--keyboard"),
+    ] = False
+    speed: Annotated[float, o.option("X", "Times faster than the game, in a window.")] = 4.0
+    save: Annotated[
+        list[Path] | None,
+        o.option("FILE", "Save as .npz, .html, .mp4, .gif or .png, a new file; may be repeated."),
+        NEW,
+    ] = None
+
+
+@command()
+def play(
+    who: PlayerOptions,
+    game: o.RuleOptions,
+    shield: o.ShieldOptions,
+    how: o.PlayOptions,
+    water: o.WaterOptions,
+    look: WindowOptions,
+    json_file: o.JsonFile = None,
+) -> None:
+    """Play one game and show what happened.
+
+    Exit status: 0 done, 2 bad input or a policy that never played, 130 interrupted.
+    """
+    if look.keyboard and who.own not in ("medium", "keyboard"):
+        raise ConfigError(f"--keyboard steers the own boats itself; leave out --keyboard, or --own {who.own}")
+    asked, rules, files = shield.given(), game.given(), look.save or []
+    if asked and not who.shield:
+        raise ConfigError(f"the shield is off, and {', '.join(asked)} would change nothing; add --shield")
+    own = "keyboard" if look.keyboard else who.own
+    spec = MatchSpec(
+        game.preset,
+        own,
+        who.opponent,
+        seed=who.seed,
+        side=who.side,
+        shield=o.with_distance(asked, game.preset, rules) if who.shield else None,
+        shield_autopilot=not who.no_shield_autopilot,
+        rules=rules,
+        conditions=water.given(),
+        files=(policies.fingerprint(own), policies.fingerprint(who.opponent)),
+        **how.given(),
+    )
+    check_penalty(spec.penalty)
+    if not 0.0 < look.speed < math.inf:
+        raise ConfigError(f"--speed must be a number above 0; got {look.speed:g}")
+    started = time.perf_counter()
+    check_endings(files)
+    result = _play(spec, look.window or KEYBOARD in (spec.own, spec.opponent), look.speed)
+    row = result.row
+    out().print(game_table(row, spec.radii_m))
+    if row["first_failure"]:
+        say(f"first policy failure: {row['first_failure']}")
+    written = [str(save_record(result.record, path)) for path in files]
+    say(*written)
+    if json_file is not None:
+        write_json(json_file, {**head_of("play", asdict(spec), started), "game": row, "files": written})
+    if held := held_games([row]):
+        raise PolicyError("; ".join(held))
+
+
+def _play(spec: MatchSpec, window: bool, speed: float) -> MatchResult:
+    config = spec.config()
+    check_current(spec.conditions, config)
+    if spec.shield is not None:
+        say_of_distance(check_shield(spec.shield, config).separation_m, config)
+    try_policies((spec.own, spec.opponent), spec.trust, config, warn)
+    if KEYBOARD in (spec.own, spec.opponent):
+        warn(STEERING)
+    if window:
+        return play_match(spec, _until_closed, "human", speed)
+    steps = 0
+    with progress("playing", round(config.max_time_s / config.decision_s)) as notice:
+
+        def watch(env: MctfEnv) -> bool:
+            nonlocal steps
+            steps += 1
+            if steps % 50 == 0:
+                notice(steps)
+            return True
+
+        return play_match(spec, watch)
+
+
+def _until_closed(env: MctfEnv) -> bool:
+    return env.renderer is None or not env.renderer.window_closed
+
+
+@command()
+def demonstrate(
+    opponent: o.Opponent = "easy",
+    preset: o.Preset = "aamas2024",
+    side: o.Side = "blue",
+    shield: o.Shielded = True,
+    seed: o.Seed = 0,
+    speed: Annotated[float, o.option("X", "Times faster than the game, in a window.")] = 2.0,
+    file: Annotated[Path, o.option("FILE.parquet", "Where demonstrations go; a new file.", "--out"), NEW] = Path(
+        "demonstration.parquet"
+    ),
+    max_time: o.MaxTime = None,
+) -> None:
+    """Play in a window by choosing an option for each boat; keep what was chosen, and at what sight, as Parquet.
+
+    Exit status: 0 done, 2 bad input, 130 interrupted.
+    """
+    if opponent not in DEMONSTRATED:
+        raise ConfigError(f"--opponent is {opponent!r}; demonstrations are against {' or '.join(DEMONSTRATED)}")
+    check_ending(file, "--out", ".parquet")
+    if find_spec("pyarrow") is None:  # before the window opens: a person's play would be lost
+        raise ConfigError(f"Parquet files need pyarrow; {install_command('parquet')}")
+    warn(CHOOSING)
+    rules = o.RuleOptions(preset, max_time).given()
+    shielded = {} if shield else None
+    spec = MatchSpec(preset, "options", opponent, 0, seed, side, shielded, rules=rules, judge="none")
+    rows, row = demonstration(spec, Demonstrator(say=warn), speed)
+    out().print(game_table(row, spec.radii_m))
+    say(keep(rows, file))
+
+
+def demonstration(
+    spec: MatchSpec, demonstrator: Demonstrator, speed: float = 1.0, mode: str | None = "human"
+) -> tuple[list[dict[str, Any]], dict[str, Any]]:
+    """Play one game; its demonstrations, each with the game's spec and result beside it, and the game's row.
+
+    Args:
+        spec: the game.
+        demonstrator: the person's team.
+        speed: times faster than the game that the window goes at most.
+        mode: "human" opens the window; None where keys come from elsewhere.
+    """
+    match = Match(spec, mode, speed)
+    try:
+        match.seat(spec.own_team, demonstrator)
+        row = match.play(None if mode is None else _until_closed).row
+    finally:
+        match.close()
+    about = {name: row[name] for name in ("preset", "opponent", "side", "seed", "captures", "captures_against")}
+    return [{**about, **one} for one in demonstrator.rows], row
+
+
+def keep(rows: list[dict[str, Any]], file: Path) -> Path:
+    """Write demonstrations.
+
+    Raises:
+        ConfigError: the file cannot be written.
+    """
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError(f"cannot write {file} ({error.strerror}); choose another --out") from error
+    return write_table(file.parent, rows, file.stem)
+
+
+@command()
+def evaluate(
+    policy: Annotated[str, typer.Argument(help="A registered policy, or the folder or zip of a submission.")],
+    game: o.RuleOptions,
+    shield_options: o.ShieldOptions,
+    how: o.PlayOptions,
+    water: o.WaterOptions,
+    many: o.GamesOptions,
+    where: o.RunOptions,
+    shield: Annotated[bool, o.flag("Whether the policy's boats are shielded.", "--shield/--no-shield")] = False,
+    no_shield_autopilot: o.NoAutopilot = False,
+) -> None:
+    """Play a policy or submission against opponents and report how it did.
+
+    Exit status: 0 done, 2 bad input or a policy that never played, 130 interrupted.
+    """
+    unused = [name for name in shield_options.given() if name != "separation_m"]  # there hits are counted anyhow
+    if unused and not shield:
+        raise ConfigError(f"the shield is off, and {', '.join(unused)} would change nothing; add --shield")
+    states = {"states": (shield,), "shield_autopilot": not no_shield_autopilot}
+    settings = settings_of(policy, game, shield_options, how, water, many, **states)
+    end_run(*run_games("evaluate", settings, where, many.quick), where)
+
+
+@command()
+def ablate(
+    game: o.RuleOptions,
+    shield_options: o.ShieldOptions,
+    how: o.PlayOptions,
+    water: o.WaterOptions,
+    many: o.GamesOptions,
+    where: o.RunOptions,
+    own: o.Own = "medium",
+    no_shield_autopilot: Annotated[
+        bool, o.flag("Play off and on only, not the shield on boats the game drives.", "--no-shield-autopilot")
+    ] = False,
+    check: o.Check = False,
+) -> None:
+    """Play every pairing off, on and covered from the same seeds; write table, report and replay.
+
+    On leaves boats that the game drives (tagged, out of bounds) to it, as a real game does; covered decides for them
+    too. Goals are judged on the first.
+
+    Exit status: 0 done, 1 a goal is not met (with --check), 2 bad input or a policy that never played, 130 interrupted.
+    """
+    states = {"shield_autopilot": False, "covered": not no_shield_autopilot}
+    settings = settings_of(own, game, shield_options, how, water, many, **states)
+    end_run(*run_games("ablate", settings, where, many.quick), where, check)
+
+
+def settings_of(
+    own: str,
+    game: o.RuleOptions,
+    shield: o.ShieldOptions,
+    how: o.PlayOptions,
+    water: o.WaterOptions,
+    many: o.GamesOptions,
+    **states: Any,
+) -> AblationSettings:
+    """What options ask for; ``states``: of the shield.
+
+    Raises:
+        ConfigError: one is unusable.
+    """
+    settings = AblationSettings(
+        preset=game.preset,
+        own=own,
+        opponents=many.names(),
+        seed=many.seed,
+        shield=shield.of_game(game.preset, game.given()),
+        rules=game.given(),
+        judge=many.judge,
+        conditions=water.given(),
+        **how.given(),
+        **states,
+    )
+    if many.quick:
+        settings = small_version(settings, QUICK_TIME_S if game.max_time is None else game.max_time, QUICK_GAMES)
+    return settings if many.games is None else replace(settings, games=many.games)
+
+
+def check_settings(settings: AblationSettings) -> None:
+    """Find every bad name or number before the first game is played.
+
+    Raises:
+        SteerclearError: a policy, preset, platform, game or shield setting is unusable.
+    """
+    if not 1 <= settings.games <= MOST_GAMES:
+        raise ConfigError(f"--games must be at least 1 and at most {MOST_GAMES:,}; got {settings.games:,}")
+    check_penalty(settings.penalty)
+    check_judge(settings.judge)
+    game = settings.specs()[0].config()
+    kept_m = check_shield(settings.shield, game).separation_m
+    if any(settings.states):
+        say_of_distance(kept_m, game)
+        made = made_of(settings.own)
+        if made is not None and made.shielded:  # games without ours are not games without a shield
+            words = "has a shield in it: off means that one alone, on that one and ours; play the bare entry instead"
+            warn(f"{settings.own} {words}")
+    names = (settings.own, *settings.opponents)
+    check_no_keyboard(names)
+    try_policies(names, settings.trust, game, warn)
+    check_current(settings.conditions, game)
+
+
+def say_of_distance(kept_m: float, game: GameConfig) -> None:
+    """Say, once a command, that its shield keeps less than the distance at which the game counts collisions."""
+    if words := words_of_less(kept_m, game):
+        warn(words)
+
+
+def run_games(
+    name: str, settings: AblationSettings, where: o.RunOptions, quick: bool = False
+) -> tuple[dict[str, Any], Run]:
+    """Play all games of the settings, write everything.
+
+    Args:
+        name: of the command.
+        settings: of the run.
+        where: folder and workers.
+        quick: whether this is the small version.
+
+    Returns:
+        The content of results.json, and the run, whose `end` ends the command.
+
+    Raises:
+        SteerclearError: bad input; what was played before stays on disk.
+    """
+    workers = where.workers()
+    check_settings(settings)
+    folder, experiment = where.folder_of(name.replace(" ", "-")), settings.experiment(name)
+    with progress("games", len(experiment.jobs)) as notice:
+        run = execute(experiment, folder, workers, where.resume, notice, warn)
+    replay = None
+    if not run.interrupted:
+        try:
+            replay = replay_of(settings.off_and_on(run.table), settings.specs(), settings.separation_m, workers)
+        except KeyboardInterrupt:
+            run.interrupted = True
+    results = results_of(run, settings, quick) | {"files": {}}
+    if run.rows:
+        entry, records = replay or (None, [])
+        results |= {"replay": entry} if entry is not None else {}
+        write_results(run, results, records)
+    return results, run
+
+
+def end_run(results: dict[str, Any], run: Run, where: o.RunOptions, check: bool = False) -> None:
+    """Show the tables, write the JSON a user asked for and choose the exit status.
+
+    Raises:
+        Interrupted: by Ctrl-C; what is finished has been written.
+        ConfigError: some games could not be played.
+        JobFault: for one of them a fault of steerclear is why.
+        PolicyError: a policy gave nothing usable throughout some game.
+    """
+    if not run.interrupted:
+        show(results, run.folder)
+        where.copy(results)
+    run.end()
+    if results["held"]:
+        raise PolicyError("; ".join(results["held"]))
+    finish(not check or met(results))
+
+
+def met(results: dict[str, Any]) -> bool:
+    """Whether no goal is missed."""
+    return all(goal["met"] is not False for goal in results["goals"])
+
+
+def show(results: dict[str, Any], folder: Path) -> None:
+    """Print the tables of a run and where its files are."""
+    settings = results["settings"]
+    if conditions := words_of(settings["conditions"]):
+        say(f"All games with {conditions}.\n")
+    if shield := words_of_settings(settings["shield"]):
+        say(f"Shield with {shield}.\n")
+    say(*(f"WARNING: {words}\n" for words in results["warnings"]))
+    for summary in results["pairings"]:
+        tables = (pairing_table(summary), covered_table(summary), verdict_table(summary))
+        out().print(*(table for table in tables if table is not None))
+        say("")
+    if results["pairings"]:
+        say(f"{HITS_WORDS}\n")
+    if settings["covered"]:
+        out().print(f"{COVERED_WORDS}\n")
+    if results["goals"]:
+        out().print(goals_table(results["goals"]))
+        say("")
+    for one in results["failed"]:
+        say(f"not played: {one['pairing']}, game {one['game']}, shield {one['state']}: {one['error']}")
+    say(*(folder / name for name in results["files"].values()))
+    if results["quick"]:
+        out().print(
+            f"This was the small version: {settings['games']} games of {settings['rules']['max_time_s']:g} s per "
+            "pairing and state. Its intervals are wide; leave out --quick for 20 games of full length."
+        )
+    elif settings["games"] < FEW_GAMES:
+        out().print(
+            f"Intervals of {settings['games']} games per pairing say little: those of means are drawn from "
+            f"these games alone. Ask for {FEW_GAMES} and more."
+        )

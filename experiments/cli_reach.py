@@ -1,0 +1,275 @@
+"""``steerclear reach``: value tables solved, shown, checked; the sets that they and the shield give up."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from steerclear.shield.exceptions import SteerclearError, TableError
+from steerclear.shield.platforms.registry import get_platform
+from steerclear.shield.tables.files import (
+    SHIPPED,
+    cache_folder,
+    check_parameters,
+    load_table,
+    read_table,
+    save_table,
+)
+from steerclear.shield.tables.make import COARSER, RADII_M, RUNS, Stage, check_radii, coarser, make_table
+from steerclear.shield.tables.settings import problem_of, read_other_may
+from steerclear.shield.tables.solve import Notice
+
+from . import cli_options as o
+from .cli_games import met
+from .console import App, Interrupted, PlainProgress, command, err, finish, out, progress, say
+from .reach.pages import (
+    LOOKED_UP,
+    PLAYED_HEADS,
+    SETS_HEADS,
+    check_picture,
+    draw_sets,
+    played_content,
+    played_rows,
+    sets_content,
+    sets_rows,
+    show_card,
+)
+from .reach.sets import PlayedSet, compare_sets, looks_up, places, played_experiment, sets_config
+from .result_files import NEW, check_new, write_json
+from .runner import RESULTS_FILE, execute
+from .tables import goals_table, titled
+from .workers import processes_of
+
+app = App(help="Reachability value tables: solve, show and check them.", no_args_is_help=True)
+CONVERGED_SHARE = 0.1
+"""Largest mean change of area from the coarser grid that `check` lets pass."""
+
+
+@dataclass(frozen=True)
+class BoatOptions:
+    """The two boats of a table."""
+
+    own: Annotated[str, o.option("NAME", "Platform of the own boat.", "--own")]
+    other: Annotated[str, o.option("NAME", "Platform of the other boat.", "--other")]
+
+
+OtherMay = Annotated[str, o.option("MODE", "What the other boat may do: worst-case or cooperative.")]
+Radius = Annotated[float, o.option("M", "Separation radius, m.")]
+
+
+@app.command()
+@command()
+def solve(
+    boats: BoatOptions,
+    other_may: OtherMay = "worst-case",
+    radius: Annotated[
+        list[float] | None,
+        o.option("M", "Separation radius to check the table for, m; may be repeated.", default="2.5, 4"),
+    ] = None,
+    out_file: Annotated[
+        Path | None, o.option("FILE", "File to write, a new one.", "--out", default="the user's cache folder"), NEW
+    ] = None,
+    horizon: Annotated[
+        float | None, o.option("S", "Longest play looked ahead, s.", default="fitted to the boats")
+    ] = None,
+    jobs: o.Jobs = None,
+    quick: Annotated[bool, o.flag("A coarse grid and few runs: for a first look only.", "--quick")] = False,
+    checkpoint: Annotated[
+        Path | None, o.option("FILE", "Where an interrupted solve is kept.", default="beside --out")
+    ] = None,
+) -> None:
+    """Solve the game of two boats and write its value table.
+
+    One table serves every separation radius; --radius says for which its grid and its promise are checked.
+    Ctrl-C keeps the state: the same command then goes on from there.
+    """
+    problem = problem_of(boats.own, boats.other, other_may, horizon_s=horizon)
+    problem = coarser(problem, 2.0) if quick else problem
+    radii, runs = tuple(radius) if radius else RADII_M, RUNS // 20 if quick else RUNS
+    check_radii(problem, radii)
+    target = out_file or cache_folder() / f"{problem.name}.npz"
+    check_new(target, "--out")
+    kept = checkpoint or target.with_name(target.name + ".checkpoint")
+    try:
+        with _stages() as stage:
+            table = make_table(problem, radii, threads=jobs, checkpoint=kept, runs=runs, stage=stage)
+    except KeyboardInterrupt:
+        raise Interrupted(f"interrupted; what was solved is kept in {kept}: the same command goes on") from None
+    save_table(table, target)
+    show_card(out(), table.card)
+    say(f"written to {target}, {target.stat().st_size / 1e6:.2f} MB")
+
+
+@contextmanager
+def _stages() -> Iterator[Stage]:
+    if not err().is_terminal:
+        yield _plain_stage
+        return
+    columns = (TextColumn("{task.description}"), BarColumn(20), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, TextColumn("{task.fields[change]}"), console=err(), transient=True) as bar:
+
+        def stage(name: str) -> Notice:
+            task = bar.add_task(name, total=None, change="")
+
+            def notice(done: int, total: int, residual_m: float) -> None:
+                bar.update(task, completed=done, total=total, change=_change(residual_m))
+
+            return notice
+
+        yield stage
+
+
+def _plain_stage(name: str) -> Notice:
+    """A stage where there is no terminal."""
+    shown: PlainProgress | None = None
+
+    def notice(done: int, total: int, residual_m: float) -> None:
+        nonlocal shown
+        shown = shown or PlainProgress(name, total, err())
+        shown(done, _change(residual_m))
+
+    return notice
+
+
+def _change(residual_m: float) -> str:
+    return f"largest change {residual_m:.3f} m" if residual_m else ""
+
+
+@app.command()
+@command()
+def show(
+    boats: BoatOptions,
+    other_may: OtherMay = "worst-case",
+    radius: Annotated[
+        list[float] | None,
+        o.option("M", "Separation radius that --picture draws, m; may be repeated.", "--radius", default="2.5, 4"),
+    ] = None,
+    file: Annotated[Path | None, o.option("FILE", "A table file instead of the installed one.")] = None,
+    picture: Annotated[Path | None, o.option("FILE", "Also draw the sets, as PNG or SVG; a new file."), NEW] = None,
+) -> None:
+    """Show a table's card and the sets in which a radius cannot be kept."""
+    check_picture(picture)
+    radii = tuple(radius) if radius else RADII_M
+    if radius and picture is None:
+        raise TableError("--radius is what --picture draws; the card has its own radii: give --picture FILE as well")
+    if file is None:
+        table = load_table(boats.own, boats.other, other_may)
+    else:
+        mode = read_other_may(other_may)
+        try:
+            table = read_table(file)
+            check_parameters(table.card, get_platform(boats.own), get_platform(boats.other), mode)
+        except TableError as error:
+            words = "is left as it is: name that table's boats, or leave --file out"
+            raise TableError(f"{error}; {file} {words}") from error
+    check_radii(problem_of(boats.own, boats.other, other_may), radii)
+    show_card(out(), table.card)
+    if picture is not None:
+        draw_sets(table, radii, picture)
+        say(f"picture: {picture}")
+
+
+@app.command()
+@command()
+def compare(
+    boats: BoatOptions, radius: Radius = 2.5, shield_set: o.ShieldSet = None, json_file: o.JsonFile = None
+) -> None:
+    """Compare the set the shield cannot promise to save with the reachability set, both of --radius.
+
+    Exit status: 0 the shield's is nowhere more than 1.15 times as large, and nowhere calls safe more than 2 % of what
+    the table calls lost; 1 somewhere it does, 2 bad input.
+    """
+    values, started = load_table(boats.own, boats.other, "worst-case"), time.perf_counter()
+    check_radii(problem_of(boats.own, boats.other), (radius,))
+    given = o.key_values(shield_set, "--shield-set")
+    config = sets_config(radius, given)
+    with progress("sets", len(places(values))) as notice:
+        pairs = compare_sets(values, config, notice)
+    settings = {"own": boats.own, "other": boats.other, "radius_m": radius, "shield": given}
+    content = sets_content(settings, pairs, looks_up(values, config), started)
+    out().print(titled(f"{boats.own} meets {boats.other}, {radius:g} m", SETS_HEADS, sets_rows(pairs)))
+    out().print(goals_table(content["goals"]))
+    if content["looked_up"]:
+        out().print(" ".join(LOOKED_UP.split()))
+    if json_file is not None:
+        write_json(json_file, content)
+    finish(met(content))
+
+
+@app.command()
+@command()
+def play(
+    boats: BoatOptions,
+    radius: Radius = 2.5,
+    shield_set: o.ShieldSet = None,
+    folder: o.Out = None,
+    jobs: o.Jobs = None,
+    resume: o.Resume = False,
+    json_file: o.JsonFile = None,
+) -> None:
+    """Play from positions all round the reachability set and beyond, and tell from which the shield saves no boat.
+
+    Each of 15 pairs of speed and heading takes one to a few minutes on a core; what is finished is kept.
+
+    Exit status: 0 what is lost and the reachability set together are nowhere more than 1.15 times as large as the
+    latter, and from no position tried beyond a boat was reached; 1 somewhere they are, or one was; 2 bad input, 130
+    interrupted.
+    """
+    check_radii(problem_of(boats.own, boats.other), (radius,))
+    experiment = played_experiment(boats.own, boats.other, radius, o.key_values(shield_set, "--shield-set"))
+    folder = folder or Path("results") / f"reach_play_{boats.own}_{boats.other}_{radius:g}"
+    workers = processes_of(jobs)
+    with progress("sets", len(experiment.jobs)) as notice:
+        run = execute(experiment, folder, workers, resume, notice)
+    run.end()
+    sets = [PlayedSet(**row) for row in run.rows]
+    content = played_content(run.head(), sets)
+    out().print(titled(f"{boats.own} meets {boats.other}, {radius:g} m", PLAYED_HEADS, played_rows(sets)))
+    out().print(goals_table(content["goals"]))
+    run.write(content)
+    say(folder / RESULTS_FILE)
+    if json_file is not None:
+        write_json(json_file, content)
+    finish(met(content))
+
+
+@app.command()
+@command()
+def check(
+    files: Annotated[
+        list[Path] | None, typer.Argument(help="Table files.", show_default="all shipped and cached ones")
+    ] = None,
+) -> None:
+    """Check tables: checksum, boats' parameters, convergence.
+
+    Exit status: 0 all in order, 1 one is damaged, made for other parameters or not converged, 2 no table found.
+    """
+    paths = files or [path for folder in (SHIPPED, cache_folder()) for path in sorted(folder.glob("*.npz"))]
+    if not paths:
+        raise TableError("no table is installed; make one with: steerclear reach solve --own heron --other heron")
+    for path in paths:
+        if not path.is_file():
+            raise TableError(f"there is no table file {path}; make one with steerclear reach solve --out {path}")
+    faults = [_fault(path) for path in paths]
+    say(*(f"{path.name}: {fault or 'in order'}" for path, fault in zip(paths, faults, strict=True)))
+    finish(not any(faults))
+
+
+def _fault(path: Path) -> str:
+    """What is wrong with a table file; empty when nothing is."""
+    try:
+        card = read_table(path).card
+        check_parameters(card, get_platform(card.own), get_platform(card.other), read_other_may(card.other_may))
+    except SteerclearError as error:
+        return str(error)
+    for radius, change in card.convergence.items():
+        if change["mean"] > CONVERGED_SHARE:
+            share = f"{100 * change['mean']:.0f} %"
+            return f"not converged at {radius} m: areas differ by {share} on a grid {COARSER:g} times coarser"
+    return "" if card.convergence else "convergence was never checked"

@@ -1,0 +1,129 @@
+"""``steerclear tournament``: the competition, with the shield and without."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from steerclear.shield.exceptions import PolicyError
+
+from . import cli_options as o
+from . import tournament as cup
+from .cli_games import met, say_of_distance
+from .console import command, finish, out, progress, say, warn
+from .game_metrics import check_penalty
+from .play.conditions import CALM, check_current
+from .play.spec import MatchSpec, check_shield
+from .policy_checks import check_no_keyboard, try_policies
+from .rankings import SCRIPTED
+from .runner import Run
+from .tables import goals_table, titled
+from .tournament_pages import all_tables, chosen_games, cycle_lines, subtitle, write_html, write_replays
+from .verdicts import check_judge
+from .workers import Workers
+
+QUICK_TIME_S = 120.0
+WIDE = 104
+"""Characters of the widest table: ranks, scores and collisions with intervals, and the paper's."""
+
+
+@dataclass(frozen=True)
+class CupOptions:
+    """Who meets whom, how often, and who is shielded."""
+
+    teams: Annotated[str, o.option("A,B", "Teams: names or submissions' paths, separated by commas.")] = ",".join(
+        SCRIPTED
+    )
+    shield: Annotated[
+        list[str] | None,
+        o.option("WHO", "off, all, or teams with commas; may be repeated.", "--shield", default="off, all"),
+    ] = None
+    repetitions: Annotated[int, o.option("N", "Times each pair meets on each side.")] = 1
+    qualifying: Annotated[bool, o.flag("Play easy, medium and hidden first.", "--qualifying")] = False
+    finalists: Annotated[int | None, o.option("N", "Best of the qualifying that go on.", default="all")] = None
+    seed: o.Seed = 0
+    quick: o.Quick = False
+    judge: o.Judge = "shielded"
+
+
+@command()
+def tournament(
+    who: CupOptions,
+    game: o.RuleOptions,
+    kept: o.KeptOptions,
+    how: o.PlayOptions,
+    where: o.RunOptions,
+    replays: Annotated[bool, o.flag("Play best, worst and most changed game again.", "--replays/--no-replays")] = True,
+    check: o.Check = False,
+) -> None:
+    """Let teams meet each other on both sides, with the shield and without; tables beside the paper's, report, replays.
+
+    Exit status: 0 done, 1 a goal is not met (with --check), 2 bad input or a team that never played, 130 interrupted.
+    """
+    settings = cup.TournamentSettings(
+        teams=o.split_names(who.teams, "--teams"),
+        preset=game.preset,
+        states=tuple(who.shield or (cup.OFF, cup.ALL)),
+        repetitions=who.repetitions,
+        seed=who.seed,
+        qualifying=who.qualifying,
+        finalists=who.finalists,
+        judge=check_judge(who.judge),
+        shield=kept.of_game(game.preset, game.given()),
+        rules=game.given(),
+        **how.given(),
+    )
+    check_penalty(settings.penalty)
+    settings = cup.quick(settings, QUICK_TIME_S) if who.quick else settings
+    workers = where.workers()
+    _check(settings)
+    with progress("games", settings.expected) as notice:
+        run = cup.play(settings, where.folder_of("tournament"), workers, where.resume, notice, warn)
+    results = _write(run, settings, workers if replays else None)
+    _show(results, run.folder)
+    if not run.interrupted:
+        where.copy(results)
+    run.end()
+    if results["silent"]:
+        names = ", ".join(results["silent"])
+        raise PolicyError(f"{names} gave no usable answer throughout some game; mend it or leave it out")
+    finish(not check or met(results))
+
+
+def _check(settings: cup.TournamentSettings) -> None:
+    """Find every bad name or number before the first game is played."""
+    config = MatchSpec.of_job(settings.final(settings.teams)[0]).config()
+    kept_m = check_shield(settings.shield, config).separation_m
+    if set(settings.states) - {cup.OFF}:
+        say_of_distance(kept_m, config)
+    check_no_keyboard(settings.teams)
+    check_current(CALM, config)
+    try_policies(settings.teams, settings.trust, config, warn)
+
+
+def _write(run: Run, settings: cup.TournamentSettings, replaying: Workers | None) -> dict[str, Any]:
+    results = cup.results_of(run, settings)
+    if run.rows:
+        links: list[dict[str, str]] = []
+        if replaying is not None and not run.interrupted:
+            chosen = chosen_games(run, cup.compared_states(settings))
+            links = write_replays(chosen, run.folder, replaying)
+        results["files"] |= {"report": "report.html"}
+        results["files"] |= {f"replay_{k}": link["path"] for k, link in enumerate(links, start=1)}
+        write_html(results, run.folder / "report.html", links)
+        run.write(results)
+    return results
+
+
+def _show(results: dict[str, Any], folder: Path) -> None:
+    say(f"{subtitle(results)}\n", *(f"WARNING: {words}\n" for words in results["warnings"]))
+    for title, heads, rows in all_tables(results):
+        out(WIDE).print(titled(title, heads, rows))
+        say("")
+    say(*cycle_lines(results))
+    if results["goals"]:
+        out().print(goals_table(results["goals"]))
+    for one in results["failed"]:
+        say(f"not played: {one['blue']} against {one['red']}, {one['state']}: {one['error']}")
+    say(*(folder / name for name in results["files"].values()))

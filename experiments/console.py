@@ -1,0 +1,272 @@
+"""Speaking to the user: results on stdout, progress and errors on stderr, exit codes that mean something."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import inspect
+import logging
+import time
+import typing
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from enum import IntEnum
+from typing import Any, NoReturn
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from steerclear.shield.exceptions import SteerclearError
+from typer.core import TyperCommand, TyperOption
+
+from .cli_files import check_files
+from .faults import fault_words, machine_words
+from .runner import Interrupted
+from .terminal import SafeConsole
+from .workers import JobFault, interrupted_by_sigterm
+
+__all__ = [
+    "App",
+    "ExitCode",
+    "Interrupted",
+    "PlainProgress",
+    "command",
+    "err",
+    "finish",
+    "out",
+    "progress",
+    "say",
+    "warn",
+]
+MAX_WIDTH = 100
+"""Tables do not stretch over wider terminals."""
+EVERY_S = 30.0
+"""Time between two lines of progress where there is no terminal, s."""
+
+
+class ExitCode(IntEnum):
+    """What the command's exit status means."""
+
+    OK = 0
+    GOAL_MISSED = 1
+    BAD_INPUT = 2
+    NOT_PROVED = 3
+    FAULT = 70
+    INTERRUPTED = 130
+
+
+EXIT_CODES = {
+    ExitCode.OK: "done",
+    ExitCode.GOAL_MISSED: "a goal is not met",
+    ExitCode.BAD_INPUT: "bad input",
+    ExitCode.NOT_PROVED: "not all is proved (replay)",
+    ExitCode.FAULT: "a fault of steerclear",
+    ExitCode.INTERRUPTED: "interrupted",
+}
+"""In words; each command's help says which of them it has, and for what."""
+
+
+def out(least: int = 0) -> Console:
+    """Return the console for results; lines of up to ``least`` characters run on rather than lose their ends."""
+    return SafeConsole(width=max(min(SafeConsole().width, MAX_WIDTH), least))
+
+
+def err() -> Console:
+    """Return the console for everything else."""
+    return SafeConsole(stderr=True)
+
+
+def say(*lines: object) -> None:
+    """Print lines as results: broken where they are, and nowhere else."""
+    for line in lines:
+        out().print(str(line), soft_wrap=True)
+
+
+def warn(text: str) -> None:
+    """Say something on stderr."""
+    err().print(text, soft_wrap=True)
+
+
+class OnceCommand(TyperCommand):
+    """A command each of whose options counts once, but for those that may be repeated: else the last would win."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse as usual what gives no option twice.
+
+        Raises:
+            UsageError: it does.
+        """
+        _, _, given = self.make_parser(ctx).parse_args(args=list(args))
+        for option in given:
+            if isinstance(option, TyperOption) and not option.multiple and given.count(option) > 1:
+                joined = ", values joined by commas" if "," in (option.metavar or "") else ""
+                ctx.fail(f"{option.opts[0]} is given twice; give it once{joined}")
+        return list(super().parse_args(ctx, args))
+
+
+class App(typer.Typer):
+    """Commands of the kind `OnceCommand`."""
+
+    def command(self, name: str | None = None, **settings: Any) -> Callable[..., Any]:
+        """As Typer's."""
+        return super().command(name, **{"cls": OnceCommand, **settings})
+
+
+def command(**defaults: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Make a function a command: its options, its exit codes, its help.
+
+    A parameter that is a dataclass is a group of options: each field becomes an option. Bad input ends in one line
+    instead of a traceback; SIGTERM is Ctrl-C.
+
+    Args:
+        defaults: of options of groups, in place of the group's own.
+    """
+
+    def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
+        options, groups = _options_of(function, defaults)
+
+        @functools.wraps(function)
+        def guarded(**given: Any) -> Any:
+            logging.captureWarnings(True)
+            try:
+                check_files(guarded, given)
+                for name, group in groups.items():
+                    given[name] = group(**{field.name: given.pop(field.name) for field in dataclasses.fields(group)})
+                with interrupted_by_sigterm():
+                    return function(**given)
+            except SteerclearError as error:
+                _leave(f"error: {error}", ExitCode.BAD_INPUT)
+            except JobFault as error:
+                _leave(f"error: {error}", ExitCode.FAULT)
+            except Interrupted as error:
+                _leave(str(error), ExitCode.INTERRUPTED)
+            except KeyboardInterrupt:
+                _leave("interrupted", ExitCode.INTERRUPTED)
+            except (typer.Exit, typer.Abort, typer.BadParameter, BrokenPipeError):
+                raise  # ends in order, and a reader of a pipe that has enough
+            except Exception as error:
+                leave_failed(error)
+
+        del guarded.__wrapped__  # type: ignore[attr-defined]  # options are those here, not the function's own
+        guarded.__signature__ = inspect.Signature(options)  # type: ignore[attr-defined]
+        guarded.__annotations__ = {option.name: option.annotation for option in options}
+        guarded.__doc__ = unbroken(function.__doc__ or "")
+        return guarded
+
+    return decorate
+
+
+def _options_of(
+    function: Callable[..., Any], defaults: dict[str, Any]
+) -> tuple[list[inspect.Parameter], dict[str, type[Any]]]:
+    """Options of a function, and its groups of options by the name of the parameter."""
+    hints = typing.get_type_hints(function, include_extras=True)
+    options, groups = list[inspect.Parameter](), dict[str, type[Any]]()
+    for name, parameter in inspect.signature(function).parameters.items():
+        if dataclasses.is_dataclass(hints[name]):
+            groups[name] = hints[name]
+            fields = typing.get_type_hints(groups[name], include_extras=True)
+            for field in dataclasses.fields(groups[name]):
+                empty = field.default is dataclasses.MISSING
+                default = defaults.get(field.name, inspect.Parameter.empty if empty else field.default)
+                options.append(_option(field.name, default, fields[field.name]))
+        else:
+            options.append(_option(name, parameter.default, hints[name]))
+    return options, groups
+
+
+def _option(name: str, default: Any, hint: Any) -> inspect.Parameter:
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=hint)
+
+
+def unbroken(text: str) -> str:
+    """Paragraphs on one line each: help is broken where the terminal ends, not where the source does."""
+    paragraphs = (" ".join(part.split()) for part in inspect.cleandoc(text).split("\n\n"))
+    return "\n\n".join(part.replace("``", "") for part in paragraphs)
+
+
+def _leave(text: str, code: ExitCode) -> NoReturn:
+    warn(text)
+    raise typer.Exit(int(code))
+
+
+def leave_failed(error: Exception) -> NoReturn:
+    """End with one line for what no one foresaw: the machine's doing, or a fault of steerclear kept in a file."""
+    if words := machine_words(error):
+        _leave(f"error: {words}", ExitCode.BAD_INPUT)
+    _leave(f"error: {fault_words(error)}", ExitCode.FAULT)
+
+
+def finish(passed: bool) -> None:
+    """End a command that judged something: exit status 1 when it did not pass."""
+    if not passed:
+        raise typer.Exit(int(ExitCode.GOAL_MISSED))
+
+
+class PlainProgress:
+    """Progress where there is no terminal to draw a bar on: a plain line now and then, fit for a log.
+
+    Prints how much is done, and about how long the rest takes, at most one line in `EVERY_S`.
+
+    Args:
+        words: what is done.
+        total: how much there is.
+        console: where lines go.
+        at_once: the first that is told is printed, too, so that a long command is seen to have begun.
+        clock: seconds that never go back.
+    """
+
+    def __init__(
+        self,
+        words: str,
+        total: int,
+        console: Console,
+        at_once: bool = False,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._words, self._total, self._console, self._clock = words, total, console, clock
+        self._began_s = clock()
+        self._next_s = self._began_s + (0.0 if at_once else EVERY_S)
+        self._before: int | None = None
+
+    def __call__(self, done: int, words: str = "") -> None:
+        """Tell that so many are done in all; those told first may be an earlier run's and say nothing of the rate."""
+        now_s = self._clock()
+        if self._before is None:
+            self._before = done
+        if now_s < self._next_s:
+            return
+        self._next_s = now_s + EVERY_S
+        parts = [f"{self._words}: {done:,} of {self._total:,}", words, self._left(done, now_s - self._began_s)]
+        self._console.print(", ".join(part for part in parts if part), soft_wrap=True)
+
+    def _left(self, done: int, spent_s: float) -> str:
+        made = done - (self._before or 0)
+        if made <= 0 or done >= self._total:
+            return ""
+        return f"about {time_words((self._total - done) * spent_s / made)} left"
+
+
+def time_words(time_s: float) -> str:
+    """A time to read: 40 s, 12 min, 3 h 5 min."""
+    if time_s < 90.0:
+        return f"{time_s:.0f} s"
+    minutes = round(time_s / 60.0)
+    return f"{minutes} min" if minutes < 90 else f"{minutes // 60} h {minutes % 60} min"
+
+
+@contextmanager
+def progress(words: str, total: int) -> Iterator[Callable[..., None]]:
+    """Show progress on stderr; call what it yields with the number of finished jobs, and what else is known.
+
+    On a terminal that is a bar, elsewhere a plain line now and then.
+    """
+    console = err()
+    if not console.is_terminal:
+        plain = PlainProgress(words, total, console)
+        yield lambda done, *_: plain(done)
+        return
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(20), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, TextColumn("left"), TimeRemainingColumn(), console=console, transient=True) as bar:
+        task = bar.add_task(words, total=total)
+        yield lambda done, *_: bar.update(task, completed=done, refresh=True)

@@ -1,1 +1,0 @@
-"""The competition: teams that meet each other on both sides, with and without the shield."""

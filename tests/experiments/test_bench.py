@@ -1,0 +1,166 @@
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from steerclear.experiments.bench import BenchSettings, bench_goals, bench_tables, run_bench
+from steerclear.experiments.bench_measures import (
+    BatchSize,
+    decide_times,
+    memory_mib,
+    programs_of,
+    quantiles_us,
+    questions_of_games,
+    scene,
+    solver_times,
+    time_calls,
+)
+from steerclear.experiments.docs import write_pages
+from steerclear.experiments.docs_keys import BENCH, GAME_ROW, KEYS, undocumented
+from steerclear.experiments.result_files import finite, write_json
+from steerclear.experiments.tournament_keys import TOURNAMENT_GAME
+from steerclear.shield import ShieldConfig
+from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.filter.program import Program
+
+TINY = replace(
+    BenchSettings(),
+    repeats=1,
+    game_s=4.0,
+    lookups=1000,
+    programs=5,
+    batch=BatchSize(games=4, steps=3, repeats=2),
+    memory_games=16,
+    scenes=3,
+    counts=(4, 8),
+)
+
+
+@pytest.fixture(scope="module")
+def content():
+    return run_bench(TINY)
+
+
+def test_everything_is_measured_and_documented(content):
+    assert undocumented(finite(content), BENCH) == []
+    assert content["decide"]["decisions"] == content["decide_by_table"]["decisions"] == 4 * 40
+    assert content["decide_by_table"]["all"]["p50_us"] > 0.0
+    assert content["decide"]["all"]["p50_us"] > 0.0
+    assert [row["shielded"] for row in content["batch"]] == [False, False, True, True]
+    assert all(row["low"] <= row["median"] <= row["high"] for row in content["batch"])
+    assert [(row["boats"], row["ours"]) for row in content["scaling"]] == [(4, 2), (8, 4)]
+    assert content["memory"]["games_mib"] > 0.0
+    assert [row["what"] for row in content["lookups"]] == ["value", "value and gradient"]
+    assert all(row["us"] > 0.0 and row["lookups"] == 1000 for row in content["lookups"])
+    assert {"daqp", "osqp", "compiled projection"} <= {row["solver"] for row in content["solvers"]}
+
+
+def test_figures_become_tables_and_a_page(content, tmp_path):
+    titles = [table.title for table in bench_tables(content)]
+    assert len(set(titles)) == len(titles) == 7
+    for table in bench_tables(content):
+        assert all(len(row) == len(table.heads) for row in table.rows)
+    write_json(tmp_path / "bench.json", content)
+    pages = write_pages([json.loads((tmp_path / "bench.json").read_text())], tmp_path / "docs")
+    text = (tmp_path / "docs" / "bench.md").read_text()
+    assert all(title in text for title in titles)
+    assert "decision p99.9, us" in text
+    assert {page.name for page in pages} == {"bench.md", "json_keys.md"}
+
+
+def test_goals_judge_the_slower_policy(content):
+    rows = [
+        {"shielded": shielded, "median": rate}
+        for shielded, rate in ((False, 3e5), (False, 2e5), (True, 9e4), (True, 8.5e4))
+    ]
+    quick, tabled = {"p50_us": 100.0, "p99_9_us": 3000.0}, {"p50_us": 101.0, "p99_9_us": 900.0}
+    memory = {"games": 4096, "games_mib": 100.0, "shield_mib": 91.0}
+    goals = bench_goals({"decide": {"all": quick}, "decide_by_table": {"all": tabled}, "batch": rows, "memory": memory})
+    assert [goal["met"] for goal in goals] == [True, False, False, True, False, True, False]
+    assert [goal["value"] for goal in goals] == [100.0, 3000.0, 101.0, 900.0, 2e5, 8.5e4, 191.0]
+
+
+def test_states_of_games_are_seeded_and_not_overwritten_by_the_game():
+    config = ShieldConfig()
+    games = questions_of_games("aamas2024", 2.0, 5, config)
+    again = questions_of_games("aamas2024", 2.0, 5, config)
+    assert [len(game) for game in games] == [20] * 4
+    for game, other in zip(games, again, strict=True):
+        assert not np.array_equal(game[0].fleet.state, game[-1].fleet.state)
+        for question, same in zip(game, other, strict=True):
+            np.testing.assert_array_equal(question.fleet.state, same.fleet.state)
+            np.testing.assert_array_equal(question.wanted.values, same.wanted.values)
+
+
+def test_times_are_split_by_what_the_shield_did():
+    games = questions_of_games("aamas2024", 20.0, 0, ShieldConfig())
+    times = decide_times(games, ShieldConfig(), 1)
+    assert 0.0 < times["share_intervening"] < 0.5
+    assert times["passes"]["p50_us"] < times["intervenes"]["p50_us"]
+    assert programs_of(games, ShieldConfig(), 3, 0)
+
+
+def test_solvers_are_held_against_each_other_on_the_same_programs():
+    rows = np.array([[1.0, 0.0], [0.0, 1.0]])
+    feasible = Program(rows, np.array([1.0, -2.0]), np.array([0.5, 0.5]))
+    impossible = Program(np.vstack([rows, -rows]), np.array([1.0, 1.0, 1.0, 1.0]), np.zeros(2))
+    times = {row["solver"]: row for row in solver_times([feasible, impossible], 1)}
+    assert times["daqp"]["ratio"] == 1.0
+    assert times["daqp"]["solved"] == times["osqp"]["solved"] == times["compiled projection"]["solved"] == 0.5
+    assert max(row["differs"] for row in times.values() if row["differs"] is not None) < 1e-3
+
+
+def test_scenes_are_as_dense_as_the_game():
+    fleet, wanted = scene(20, 0)
+    spread = np.ptp(fleet.position_m, axis=0)
+    gaps = np.linalg.norm(fleet.position_m[:, None] - fleet.position_m[None], axis=2)[np.triu_indices(20, 1)]
+    assert gaps.min() > 4.0
+    assert (spread < np.sqrt(20 * 533.0)).all()
+    assert int(fleet.controlled.sum()) == 10
+    assert len(wanted) == 20
+
+
+def test_timing_helpers():
+    calls = []
+    assert len(time_calls(calls.append, 7)) == 7
+    assert calls == list(range(7))
+    disturbed = np.arange(1001.0)
+    disturbed[500] = 1e6
+    figures = quantiles_us([np.arange(1001.0), disturbed, np.arange(1001.0)])
+    assert figures == {"p50_us": 500.0, "p99_us": 990.0, "p99_9_us": pytest.approx(999.0)}
+    assert quantiles_us([np.zeros(0)]) == {"p50_us": None, "p99_us": None, "p99_9_us": None}
+    assert memory_mib(lambda: np.zeros(2**20)) == pytest.approx(8.0, rel=0.01)
+
+
+def test_the_page_of_keys_holds_every_key(tmp_path):
+    write_pages([], tmp_path)
+    text = (tmp_path / "json_keys.md").read_text()
+    assert all(f"`{key}`" in text for keys in KEYS.values() for key in keys)
+
+
+def test_every_key_of_changed_commands_says_whether_it_is_a_fraction_or_percent():
+    tables = (*KEYS.values(), GAME_ROW, TOURNAMENT_GAME)
+    found = {key: words for keys in tables for key, words in keys.items() if "changed_share" in key}
+    assert any("metrics" in key for key in found)
+    assert any("metrics" not in key for key in found)
+    for key, words in found.items():
+        assert ("%" in words) == ("metrics" in key), key
+        assert ("0 to 1" in words) == ("metrics" not in key), key
+
+
+def test_no_page_is_made_of_other_results(tmp_path):
+    with pytest.raises(
+        ConfigError, match="ablate, evaluate, tournament, bench, encounters, reach compare, reach play or train-study"
+    ):
+        write_pages([{"command": "parity"}], tmp_path)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ConfigError, match="choose another --out"):
+        write_pages([], tmp_path / "file" / "docs")
+
+
+def test_no_page_is_written_over_another(tmp_path):
+    settings = {"preset": "aamas2024", "own": "medium", "games": 1, "rules": {}}
+    about = {"quick": False, "seeds": [0], "versions": {"steerclear": "1"}, "goals": []}
+    games = {"command": "evaluate", "settings": settings, "pairings": [], **about}
+    with pytest.raises(ConfigError, match=r"two of the results make evaluation_aamas2024\.md; give them one at a time"):
+        write_pages([games, games], tmp_path)

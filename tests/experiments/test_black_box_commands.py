@@ -1,0 +1,224 @@
+"""What users see of the commands: options, exit codes, files, figures of fixed seeds, and how runs end and go on."""
+
+import errno
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import typer
+from steerclear.experiments import cli
+from steerclear.experiments.console import ExitCode
+from typer.testing import CliRunner
+
+ALL = """
+ablate: --address --answer-time --certificate --check --current --delay --engine --fixed-start --games --jobs --json
+    --judge --max-time --no-shield-autopilot --noise --opponents --out --own --penalty --platform --preset --profile
+    --quick --resume --seed --separation --set --shield-set --solver --trust
+attack: --address --attackers --current --delay --engine --generations --guard --jobs --json --noise --out --own
+    --platform --population --radius --replay --restarts --resume --seed --workers
+bench: --check --json --preset --quick --seed
+compare: --json first second
+demonstrate: --max-time --no-shield --opponent --out --preset --seed --shield --side --speed
+deploy: --accept --boat --demo --json --link --minutes --no-tlog --opponents --plain --policy --seed --speed --trust
+    --wait fleet
+docs: --out sources
+encounters: --address --current --delay --engine --family --guard --jobs --json --n --no-judge --noise --out
+    --platform --radius --resume --scene --seed --workers
+entry check: --answer-time --json --max-time --preset entry
+entry report: --address --also --answer-time --engine --games --jobs --json --judge --looks --max-time --opponents
+    --out --platform --preset --profile --quick --resume --seed --separation --set --shield-set entry
+entry wrap: --json --out --preset --profile --separation --shield-set entry
+evaluate: --address --answer-time --certificate --current --delay --engine --fixed-start --games --jobs --json
+    --judge --max-time --no-shield --no-shield-autopilot --noise --opponents --out --penalty --platform --preset
+    --profile --quick --resume --seed --separation --set --shield --shield-set --solver --trust policy
+export: --interval --out --submission model
+fit: --boat --json --kind --name --out --plot --system-id logs
+parity: --jobs --json traces
+platform check: name
+platform new: --from --out name
+platform show: name
+play: --answer-time --certificate --current --delay --fixed-start --headless --json --keyboard --max-time
+    --no-shield --no-shield-autopilot --noise --opponent --own --penalty --platform --preset --profile --save --seed
+    --separation --set --shield --shield-set --side --solver --speed --trust --window
+preflight: --accept --boat --json --no-drill --no-tlog --speed --wait fleet
+reach check: files
+reach compare: --json --other --own --radius --shield-set
+reach play: --jobs --json --other --out --own --radius --resume --shield-set
+reach show: --file --other --other-may --own --picture --radius
+reach solve: --checkpoint --horizon --jobs --other --other-may --out --own --quick --radius
+referee: --json --links --listen --minutes --publish --rate --speed --with-parent fleet
+render: --at --json --speed --to records
+replay: --html --json --judge --key --mend --no-judge --record --without-shield log
+sea-trial: --accept --boat --max-speed --no-tlog --only --speed --wait fleet
+sim-boats: --allow-remote --boot --check --current --delay --demo --duration --fault --jitter --json --loss
+    --no-wait --noise --off --opponents --random-start --really --record --seed --speed --wind --with-parent fleet
+tournament: --address --answer-time --check --engine --finalists --fixed-start --jobs --json --judge --max-time
+    --no-replays --out --penalty --platform --preset --profile --qualifying --quick --repetitions --replays --resume
+    --seed --separation --set --shield --shield-set --teams --trust
+train: --out --resume config
+train-study: --games --jobs --out --seeds config
+warm-up:
+"""
+"""Every command with its options and arguments: public, so that none goes without a word."""
+
+
+def run(*arguments):
+    return CliRunner().invoke(cli.app, [str(argument) for argument in arguments])
+
+
+def commands_of(command, name=""):
+    for sub, inner in getattr(command, "commands", {}).items():
+        yield from commands_of(inner, f"{name} {sub}".strip())
+    if not hasattr(command, "commands"):
+        options = {text for one in command.params for text in (*one.opts, *one.secondary_opts)}
+        yield name, {text for text in options if text.startswith("-") or text.isidentifier()} - {"--help", "-h"}
+
+
+def test_commands_and_options_stay():
+    lines = re.sub(r"\n    +", " ", ALL.strip()).splitlines()
+    told = {name: set(options.split()) for name, _, options in (line.partition(":") for line in lines)}
+    assert dict(commands_of(typer.main.get_command(cli.app))) == told
+
+
+TINY = ["ablate", "--opponents", "easy", "--games", "2", "--max-time", "40", "--seed", "3", "--jobs", "1"]
+FIGURES = {
+    "tags": (2.0, 2.0, 2.0),
+    "breaches_teammate_2.5m": (2.0, 0.0, 0.0),
+    "breaches_teammate_4.0m": (2.0, 1.0, 2.5),
+    "closest_m": (0.9098, 3.5511, 3.1749),
+    "changed_share": (None, 3.2193, 4.7083),
+    "reversals_per_boat_minute": (39.75, 47.5, 38.0),
+    "primary": (-1.0, 0.0, 0.0),
+}
+"""Off, on and covered; those of off and covered are version 0.8.0's, whose "on" covered."""
+
+
+def test_the_same_seeds_give_the_same_figures_and_files(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = run(*TINY, "--out", "out", "--json", "copy.json")
+    assert done.exit_code == ExitCode.OK, done.output
+    content = json.loads(Path("copy.json").read_text())
+    metrics = content["pairings"][0]["metrics"]
+    found = {key: tuple(metrics[key].get(s, {}).get("value") for s in ("off", "on", "covered")) for key in FIGURES}
+    assert found == {key: pytest.approx(values, abs=5e-4) for key, values in FIGURES.items()}
+    assert {path.name for path in Path("out").iterdir()} - {".lock"} == {
+        *("experiment.json", "rows.jsonl", "results.json", "report.html", "replay.html"), content["files"]["games"],
+    }  # fmt: skip
+    assert {"command", "complete", "settings", "versions", "machine", "wall_s", "failed", "goals"} <= set(content)
+    assert run("compare", "out", "out").exit_code == ExitCode.OK
+    assert run("docs", "out", "--out", "pages").exit_code == ExitCode.OK
+    assert Path("pages/ablation_aamas2024.md").exists()
+    refused = run("encounters", "--out", "out", "--resume")
+    assert refused.exit_code == ExitCode.BAD_INPUT
+    assert "holds results of 'ablate', not of 'encounters'; choose another --out" in refused.stderr
+
+
+STANDINGS = {
+    ("off", "ohto"): (1, -0.5, 2.0),
+    ("off", "jin"): (2, -1.5, 6.0),
+    ("all", "jin"): (1, 0.0, 0.0),
+    ("all", "ohto"): (1, 0.0, 0.0),
+}
+"""Rank, score and collisions as version 0.8.0 has them."""
+
+
+def test_a_tournament_of_fixed_seeds(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    arguments = ["tournament", "--teams", "ohto,jin", "--max-time", "40", "--seed", "3", "--jobs", "1", "--out", "out"]
+    done = run(*arguments)
+    assert done.exit_code == ExitCode.OK, done.output
+    content = json.loads(Path("out/results.json").read_text())
+    off, covered = content["states"]
+    lines = {(state["state"], line["team"]): line for state in (off, covered) for line in state["standings"]}
+    assert {key: (line["rank"], line["score"], line["collisions"]) for key, line in lines.items()} == STANDINGS
+    assert {path.name for path in Path("out").iterdir()} >= {"replay-1.html", "replay-2.html", "replay-3.html"}
+    again = run(*arguments, "--resume")
+    assert again.exit_code == ExitCode.OK, again.output
+    assert "4 of 4 games are in out/rows.jsonl and are taken from there" in again.stderr
+    assert json.loads(Path("out/results.json").read_text())["games_resumed"] == content["games_played"]
+
+
+ENDS = {"SIGINT": ExitCode.INTERRUPTED, "SIGTERM": ExitCode.INTERRUPTED, "SIGKILL": -9}
+
+
+def _heed_ctrl_c():
+    """Undo what a shell does to what it starts in the background: there Ctrl-C is ignored."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="sends POSIX signals")
+def test_however_a_run_ends_what_is_finished_is_kept_and_gone_on_with(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    begin = ["ablate", "--opponents", "hold", "--max-time", "20", "--no-shield-autopilot", "--judge", "none", "--games"]
+    command, running = [sys.executable, "-m", "steerclear.experiments.cli", *begin, "400"], {}
+    for name in ENDS:  # all at once: most of their time they load
+        jobs = ["--jobs", "2" if name == "SIGINT" else "1", "--out", name]
+        running[name] = subprocess.Popen([*command, *jobs], stderr=subprocess.PIPE, preexec_fn=_heed_ctrl_c)
+    waiting, deadline = dict(running), time.monotonic() + 300.0
+    while waiting and time.monotonic() < deadline:
+        for name, process in list(waiting.items()):
+            lines = tmp_path / name / "rows.jsonl"
+            if lines.exists() and lines.read_bytes().count(b"\n") >= 2:
+                waiting.pop(name)
+                process.send_signal(getattr(signal, name))
+        time.sleep(0.1)
+    assert not waiting
+    for name, process in running.items():
+        _, errors = process.communicate(timeout=300.0)
+        assert process.returncode == ENDS[name], errors
+        if name != "SIGKILL":
+            assert f"--out {name} --resume goes on from there" in errors.decode()
+            assert json.loads(Path(name, "results.json").read_text())["complete"] is False
+    whole = run(*begin, "2", "--jobs", "1", "--out", "whole")
+    assert whole.exit_code == ExitCode.OK, whole.output
+    for name in ENDS:
+        with Path(name, "rows.jsonl").open("ab") as lines:
+            lines.write(b'{"cut')  # as a kill in the middle of a line leaves it
+        again = run(*begin, "2", "--jobs", "1", "--out", name, "--resume")
+        assert again.exit_code == ExitCode.OK, again.output
+        found, expected = (json.loads(Path(one, "results.json").read_text()) for one in (name, "whole"))
+        assert found["games_resumed"] >= 2
+        assert (found["complete"], found["games_played"]) == (True, 4)
+        assert without_times(found) == without_times(expected)
+
+
+def without_times(content):
+    metrics = content["pairings"][0]["metrics"]
+    return {key: figures for key, figures in metrics.items() if not key.startswith("decision_")}
+
+
+def test_a_full_disk_loses_nothing_and_says_so(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    kept, written = os.fsync, []
+
+    def full(file):
+        written.append(file)
+        if len(written) > 2:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        kept(file)
+
+    monkeypatch.setattr(os, "fsync", full)
+    done = run("ablate", "--opponents", "hold", "--games", "2", "--max-time", "2", "--jobs", "1", "--out", "out")
+    monkeypatch.undo()
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert "(No space left on device)" in done.stderr
+    assert "make room, then --resume" in done.stderr
+    assert len((tmp_path / "out/rows.jsonl").read_text().splitlines()) == 2
+
+
+def test_a_folder_of_an_earlier_version_is_refused_by_its_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("old").mkdir()
+    Path("old/games.jsonl").write_text("{}\n")
+    Path("old/results.json").write_text('{"command": "ablate", "versions": {"steerclear": "0.8.0"}}')
+    before = {path.name: path.read_text() for path in Path("old").iterdir()}
+    done = run("ablate", "--opponents", "hold", "--out", "old", "--resume")
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert "holds results of steerclear 0.8.0, which this version reads (compare, docs) but does not" in done.stderr
+    assert {path.name: path.read_text() for path in Path("old").iterdir()} == before

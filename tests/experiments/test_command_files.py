@@ -1,0 +1,333 @@
+"""Nothing that a command reads, or that is there, is written over by what it writes."""
+
+import inspect
+import zipfile
+from pathlib import Path
+from typing import get_args, get_type_hints
+
+import pytest
+from logged_runs import header_of, write_log
+from steerclear.experiments.cli import app
+from steerclear.experiments.cli_files import check_apart, check_files, check_json_file, written_by
+from steerclear.experiments.cli_games import ablate
+from steerclear.experiments.console import ExitCode
+from steerclear.experiments.result_files import check_new
+from steerclear.policies.entrants.learned.entered import FILES
+from steerclear.shield import ShieldConfig
+from steerclear.shield.exceptions import ConfigError
+from typer.testing import CliRunner
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    path = tmp_path_factory.mktemp("logs") / "run.mcap"
+    write_log(path, 20, header=header_of(ShieldConfig()))
+    return path.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ("--html run.mcap", "named twice, by log and by --html"),
+        ("--json run.mcap", "named twice, by log and by --json"),
+        ("--mend run.mcap", "named twice, by log and by --mend"),
+        ("--mend ../here/run.mcap", "named twice, by log and by --mend"),
+        ("--record run.mcap", "named twice, by log and by --record"),
+        ("--html out.html --json out.html", "named twice, by --html and by --json;"),
+        ("--html other.mcap", "does not end in .html"),
+        ("--record game.html", "does not end in .npz"),
+        ("--mend whole.npz", "does not end in .mcap"),
+        ("--json other.mcap", "the ending of black boxes"),
+        ("--json", "requires an argument"),
+    ],
+)
+def test_a_replay_leaves_the_black_box_alone(more, words, written, tmp_path, monkeypatch):
+    here = tmp_path / "here"
+    here.mkdir()
+    monkeypatch.chdir(here)
+    Path("run.mcap").write_bytes(written)
+    done = CliRunner().invoke(app, ["replay", "run.mcap", *more.split()], terminal_width=200)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert words in " ".join(done.stderr.split())
+    assert [path.name for path in here.iterdir()] == ["run.mcap"]
+    assert Path("run.mcap").read_bytes() == written
+
+
+def test_links_to_one_file_are_that_file(tmp_path):
+    (tmp_path / "a.npz").touch()
+    (tmp_path / "b.npz").symlink_to("a.npz")
+    with pytest.raises(ConfigError, match=r"b\.npz is named twice, by records and by --to"):
+        check_apart({"records": [tmp_path / "a.npz"], "--to": tmp_path / "b.npz"})
+
+
+def test_folders_devices_and_what_is_no_file_may_be_named_twice(tmp_path):
+    check_apart({"--out": tmp_path, "sources": [tmp_path], "--json": Path("/dev/null"), "--html": Path("/dev/null")})
+    check_apart({"records": [tmp_path / "a.npz", tmp_path / "a.npz"], "seed": 3, "--to": None})
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        ("play --save a.npz --save a.npz", "a.npz is named twice by --save"),
+        ("play --save a.html --save b.npz --save ./a.html", "a.html is named twice by --save"),
+        ("play --save link.npz --save a.npz", "a.npz is named twice by --save"),
+        ("fit run.csv run.csv", "run.csv is named twice by LOG..."),
+        ("fit run.csv ../here/run.csv", "../here/run.csv is named twice by LOG..."),
+        ("play --save a.npz --json a.npz", "a.npz is named twice, by --save and by --json"),
+    ],
+)
+def test_one_option_names_a_file_once(words, named, tmp_path, monkeypatch):
+    here = tmp_path / "here"
+    here.mkdir()
+    monkeypatch.chdir(here)
+    Path("run.csv").touch()
+    Path("link.npz").symlink_to("a.npz")
+    done = CliRunner().invoke(app, words.split(), terminal_width=200)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert f"error: {named}" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert sorted(path.name for path in here.iterdir()) == ["link.npz", "run.csv"]
+
+
+@pytest.mark.parametrize(
+    "words",
+    ["ablate", "evaluate medium", "tournament", "encounters", "attack", "reach play --own heron --other heron"],
+)
+@pytest.mark.parametrize("more", ["", " --resume"])
+def test_no_json_is_written_where_the_command_keeps_its_own_results(words, more, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    line = f"{words} --out out --json ./out/results.json{more}"
+    done = CliRunner().invoke(app, line.split(), terminal_width=200)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert "--json out/results.json is what the command writes into out itself; leave it out" in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["rows.jsonl", "rows.csv", "rows.parquet", "boat.png", "a.zip", "a.gif"])
+def test_json_has_no_ending_of_other_results(name):
+    with pytest.raises(ConfigError, match=r"has the ending of .*; give a name that ends in \.json"):
+        check_json_file(Path(name))
+
+
+def test_results_may_have_any_ending_that_is_nobody_elses(tmp_path):
+    for name in ("results.json", "results", "results.txt"):
+        check_json_file(tmp_path / name)
+    check_json_file(None)
+
+
+@pytest.mark.parametrize("folder", [".", "..", "sub"])
+def test_a_folder_is_no_record(folder, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("sub").mkdir()
+    done = CliRunner().invoke(app, ["render", folder], terminal_width=200)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert "is a folder; name a record in it" in done.stderr
+
+
+@pytest.mark.parametrize("name", ["../../x y", "a/b", "..", ".hidden", "two words", "", "boat.yaml", "b" * 33, "é"])
+def test_a_new_platform_has_a_plain_name_and_lies_where_it_was_begun(name, tmp_path, monkeypatch):
+    here = tmp_path / "one" / "two"
+    here.mkdir(parents=True)
+    monkeypatch.chdir(here)
+    done = CliRunner().invoke(app, ["platform", "new", "--", name], terminal_width=200)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert "give 1 to 32 letters, digits" in done.stderr
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
+
+
+def test_a_new_platform_of_a_plain_name_is_written(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert CliRunner().invoke(app, ["platform", "new", "my-boat_2.b"]).exit_code == 0
+    assert (tmp_path / "my-boat_2.b.yaml").exists()
+
+
+@pytest.mark.parametrize("option", ["--out there.npz", "--out new.npz --submission there.zip"])
+def test_an_export_writes_over_no_file(option, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("there.npz", "there.zip"):
+        Path(name).write_text("mine")
+    done = CliRunner().invoke(app, ["export", str(FILES["jin"]), *option.split()], terminal_width=200)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    name, place = option.split()[::-1][:2]
+    assert f"{name} is there already; name another {place}" in done.stderr
+    assert [path.name for path in sorted(tmp_path.iterdir())] == ["there.npz", "there.zip"]
+    assert {path.read_text() for path in tmp_path.iterdir()} == {"mine"}
+
+
+READ = {
+    "deploy fleet", "preflight fleet", "referee fleet", "sim-boats fleet", "sea-trial fleet", "train config",
+    "train-study config", "export model", "encounters scene", "attack replay", "parity traces", "render records",
+    "docs sources", "compare first", "compare second", "replay log", "replay key", "fit logs",
+    "reach show file", "reach check files",
+}  # fmt: skip
+"""Files that commands read."""
+FOLDERS = {
+    f"{name} folder"
+    for name in ("evaluate", "ablate", "tournament", "train", "encounters", "attack", "docs", "train-study",
+                 "reach play", "entry report")
+}  # fmt: skip
+"""Folders of results: refused or gone on with by `ResultStore` and its like, see test_results_write_over_nothing."""
+GOES_ON = {"reach solve checkpoint"}
+"""Files that an interrupted command leaves for the same command to go on from."""
+
+
+def all_commands(where, begin=""):
+    for entry in where.registered_commands:
+        yield f"{begin}{entry.name or entry.callback.__name__}", entry.callback
+    for group in where.registered_groups:
+        yield from all_commands(group.typer_instance, f"{begin}{group.name} ")
+
+
+def files_of(function):
+    """Names of arguments that are paths."""
+    hints = get_type_hints(inspect.unwrap(function), include_extras=True)
+    return [name for name, hint in hints.items() if name != "return" and "pathlib.Path" in str(get_args(hint)[:1])]
+
+
+def test_every_file_that_a_command_writes_must_be_new():
+    """A new option for a path is one of these, or marked `NEW`: then no file there is written over."""
+    known, marked = READ | FOLDERS | GOES_ON, set()
+    for name, function in all_commands(app):
+        written = {f"{name} {argument}" for argument in written_by(function)}
+        assert {f"{name} {argument}" for argument in files_of(function)} - known == written
+        marked |= written
+    assert len(marked) > 30
+    assert {"fit file", "reach solve out_file", "render to", "play save", "ablate json_file"} <= marked
+
+
+@pytest.mark.parametrize(
+    ("words", "name", "option"),
+    [
+        ("fit none.csv --out mine.yaml", "mine.yaml", "--out"),
+        ("fit none.csv", "boat.yaml", "--out"),
+        ("fit none.csv --out new.yaml", "new.png", "--plot"),
+        ("fit none.csv --plot mine.svg", "mine.svg", "--plot"),
+        ("render none.npz --to mine.html", "mine.html", "--to"),
+        ("play --save new.npz --save mine.npz", "mine.npz", "--save"),
+        ("reach solve --own heron --other heron --out mine.npz", "mine.npz", "--out"),
+        ("reach show --own heron --other heron --picture mine.png", "mine.png", "--picture"),
+        ("sim-boats --demo --record mine.npz", "mine.npz", "--record"),
+        ("demonstrate --out mine.parquet", "mine.parquet", "--out"),
+        ("platform new mine", "mine.yaml", "--out"),
+        ("ablate --json mine.json", "mine.json", "--json"),
+        ("entry check none.zip --json mine.json", "mine.json", "--json"),
+    ],
+)
+def test_no_command_writes_over_a_file(words, name, option, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path(name).write_text("mine")
+    done = CliRunner().invoke(app, words.split(), terminal_width=200)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert f"error: {name} is there already; name another {option}, or remove it" in done.stderr
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {name: "mine"}
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "fit none.csv --out {}.yaml",
+        "fit none.csv --plot {}.png",
+        "render none.npz --to {}.png",
+        "reach solve --own heron --other heron --out {}.npz",
+        "reach show --own heron --other heron --picture {}.png",
+        "platform new mine --out {}.yaml",
+        "bench --json {}.json",
+    ],
+)
+def test_a_place_that_takes_no_file_is_found_out_before_any_work(words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("file").write_text("mine")
+    done = CliRunner().invoke(app, words.format("file/x/y").split(), terminal_width=200)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert "cannot be written (Not a directory); name a file elsewhere" in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+@pytest.mark.parametrize("words", ["platform new mine --out", "reach show --own heron --other heron --picture"])
+def test_folders_of_a_file_are_made(words, tmp_path):
+    file = tmp_path / "a" / "b" / ("mine.yaml" if "platform" in words else "sets.png")
+    done = CliRunner().invoke(app, [*words.split(), str(file)], terminal_width=200)
+    assert done.exit_code == ExitCode.OK, done.output
+    assert file.stat().st_size > 0
+
+
+def test_a_replay_beside_its_record_is_not_written_over(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("steerclear.experiments.cli_tools.load", lambda path: {})
+    Path("game.html").write_text("mine")
+    done = CliRunner().invoke(app, ["render", "game.npz"], terminal_width=200)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert "game.html is there already; name another --to, or remove it" in done.stderr
+
+
+def test_a_file_to_write_is_no_folder(tmp_path):
+    with pytest.raises(ConfigError, match=r"--out .* is a folder; name a file in it"):
+        check_new(tmp_path, "--out")
+
+
+def test_a_run_that_is_gone_on_with_writes_its_json_again(tmp_path):
+    (tmp_path / "a.json").write_text("mine")
+    given = {"json_file": tmp_path / "a.json", "resume": True}
+    check_files(ablate, given)
+    with pytest.raises(ConfigError, match=r"a\.json is there already; name another --json"):
+        check_files(ablate, {**given, "resume": False})
+
+
+@pytest.mark.parametrize("command", ["ablate --quick", "evaluate medium --quick", "encounters", "attack", "tournament"])
+@pytest.mark.parametrize("name", ["report.html", "rows.csv"])
+def test_results_write_over_nothing(command, name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("out").mkdir()
+    Path("out", name).write_text("mine")
+    done = CliRunner().invoke(app, [*command.split(), "--out", "out"], terminal_width=200)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert f"{name} would be written over; choose another --out, or move it" in done.stderr
+    assert {path.name: path.read_text() for path in Path("out").iterdir()} == {name: "mine"}
+
+
+@pytest.mark.parametrize(
+    "line", ["ablate", "evaluate medium", "encounters", "attack", "tournament", "entry report a.zip --opponents hold"]
+)
+def test_a_run_to_go_on_with_is_named(line, tmp_path, monkeypatch):
+    """Else a new folder would be begun beside it."""
+    monkeypatch.chdir(tmp_path)
+    with zipfile.ZipFile("a.zip", "w") as packed:
+        packed.writestr("solution.py", "class solution:\n    def compute_action(self, agent_id, a, b, c): return 4\n")
+    done = CliRunner().invoke(app, [*line.split(), "--resume"], terminal_width=200)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert "--resume needs the --out folder of the run to go on with" in done.stderr
+    assert not Path("results").exists()
+
+
+@pytest.mark.parametrize("words", ["encounters --scene none.json", "attack --replay none.json"])
+def test_scenes_write_over_no_replay(words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("replay.html").write_text("mine")
+    done = CliRunner().invoke(app, [*words.split(), "--out", "."], terminal_width=200)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert "replay.html is there already; name another --out, or remove it" in done.stderr
+    assert Path("replay.html").read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", ["config.yaml", "best.npz"])
+def test_a_training_writes_over_nothing(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("a.yaml").write_text("algorithm: cloning\n")
+    Path("out").mkdir()
+    Path("out", name).write_text("mine")
+    done = CliRunner().invoke(app, ["train", "a.yaml", "--out", "out"], terminal_width=200)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert f"{name} would be written over; name another --out, or move it" in done.stderr
+    assert Path("out", name).read_text() == "mine"
+
+
+def test_docs_makes_its_own_pages_anew_and_no_others(tmp_path):
+    (tmp_path / "json_keys.md").write_text("# Our keys\n")
+    done = CliRunner().invoke(app, ["docs", "--out", str(tmp_path)], terminal_width=200)
+    assert done.exit_code == ExitCode.BAD_INPUT
+    assert "json_keys.md was not made by steerclear docs; choose another --out, or move it" in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["json_keys.md"]
+    (tmp_path / "json_keys.md").unlink()
+    for _ in range(2):
+        assert CliRunner().invoke(app, ["docs", "--out", str(tmp_path)]).exit_code == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["json_keys.md"]
