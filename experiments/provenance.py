@@ -31,7 +31,7 @@ SOURCES = ("*.py", "*.npz", "shipped/*.yaml")
 NO_GAME = (
     "shield/bridge/",
     "env/render/",
-    "experiments/boats/",
+    "experiments/sim_boats/",
     *(f"experiments/{name}.py" for name in ("docs", "docs_encounters", "docs_keys", "markdown", "page", "plots")),
     *(f"experiments/{name}.py" for name in ("report", "replay_data", "replay_html", "tables", "terminal")),
     *(f"experiments/{name}" for name in ("cli", "console", "saving", "tournament_pages")),
