@@ -31,6 +31,7 @@ BREACH = {
     "exhausted": "whether the search that found no later way kept every state it reached at its resolution",
     "responsible": "who let the later last moment pass: own, opponent, both, game (it drove the boat), neither, start",
     "responsible_boats[]": "those boats",
+    "driven": "whether the game drove every own boat in it when it began, so that no command could prevent it",
 }
 
 MEANINGS = meanings_of(game_metrics_of())

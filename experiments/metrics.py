@@ -162,6 +162,7 @@ GAME_COLUMNS = {
     "opponent_policy_usable_steps": "the same of the other team",
     "first_failure": "text of the first of them",
     "avoidable": "breaches that own commands could have avoided, of both kinds; null when not judged",
+    "avoidable_driven": "of those, of boats that the game drove: no command could prevent them",
     "avoidable_*": "breaches of that kind and radius that own commands could have avoided; null when not judged",
     "unavoidable_*": "breaches that no own command of the last 30 s could have avoided",
     "started_inside_*": "breaches of a pair that was inside when the game began",
@@ -277,22 +278,26 @@ def _driven_words(kind: str, radius_m: float) -> Callable[[pd.DataFrame], str]:
     """How many shielded breaches are of boats that the game drives; they obey nobody, and are not judged."""
 
     def words(table: pd.DataFrame) -> str:
-        column, pairs = f"{breach_column(f'driven_{kind}', radius_m)}_on", pairs_of(table)
-        count = int(pairs[column].sum()) if column in pairs else 0
-        return f"beside {count} of boats that the game drives" if count else ""
+        return _beside(pairs_of(table).get(f"{breach_column(f'driven_{kind}', radius_m)}_on"))
 
     return words
 
 
-def rate(column: str, paired: bool = True) -> Callable[[pd.DataFrame], Interval | None]:
-    """Events per shielded game: of games with a pair, or of all that have the column."""
+def _beside(driven: pd.Series[Any] | None) -> str:
+    count = 0 if driven is None else int(driven.sum())
+    return f"beside {count} of boats that the game drives" if count else ""
+
+
+def rate(column: str, less: str = "", paired: bool = True) -> Callable[[pd.DataFrame], Interval | None]:
+    """Events per shielded game, but for those of the column ``less``: of games with a pair, or of all that tell."""
 
     def measure(table: pd.DataFrame) -> Interval | None:
         if column not in table or table.empty:
             return None
-        shielded = pairs_of(table)[f"{column}_on"] if paired else table[table["shielded"]][column]
-        events = shielded.dropna()
-        return count_interval(int(events.sum()), len(events)) if len(events) else None
+        games, end = (pairs_of(table), "_on") if paired else (table[table["shielded"]], "")
+        games = games.dropna(subset=[column + end])
+        events = games[column + end].sum() - (games[less].sum() if less in games else 0)
+        return count_interval(int(events), len(games)) if len(games) else None
 
     return measure
 
@@ -341,5 +346,11 @@ def game_goals(separation_m: float) -> list[Goal]:
         Goal(f"hits with opponents {at}, on / off", _paired(opponents), "<=", 0.1, beside["opponent"]),
         Goal("captures, on / off", on_over_off("captures"), ">=", 0.9),
         Goal("deadlocks, shielded, per game", rate("deadlocks"), "<=", 0.0),
-        Goal(f"avoidable hits at {separation_m:g} m, shielded, per game", rate("avoidable", False), "<=", 0.0),
+        Goal(
+            f"avoidable hits {at}, shielded, per game",
+            rate("avoidable", "avoidable_driven", paired=False),
+            "<=",
+            0.0,
+            lambda table: _beside(table[table["shielded"]].get("avoidable_driven")),
+        ),
     ]

@@ -109,7 +109,16 @@ def judge_game(
     verdicts = oracle.judge_breaches(log.states, params, found[:MOST_JUDGED], radius_m, dt_s, log.driven, motion=motion)
     padded: list[BreachVerdict | None] = [*verdicts, *[None] * (len(found) - len(verdicts))]
     disabled = getattr(log, "disabled", None)
-    return [_entry(row, verdict, meta, team, side, disabled) for row, verdict in zip(found, padded, strict=True)]
+    return [
+        _entry(row, verdict, meta, team, side, disabled) | {"driven": _is_driven(row, log.driven, team, side)}
+        for row, verdict in zip(found, padded, strict=True)
+    ]
+
+
+def _is_driven(row: np.ndarray, driven: np.ndarray, team: np.ndarray, side: int) -> bool:
+    """Whether the game drove every own boat of a breach when it began: then no command could prevent it."""
+    step, own = int(row[0]), [boat for boat in (int(row[1]), int(row[2])) if team[boat] == side]
+    return bool(driven[step - 1, own].all())
 
 
 def _entry(
@@ -189,10 +198,12 @@ def verdict_columns(breaches: Sequence[Row] | None, radius_m: float) -> dict[str
         radius_m: at which they were.
 
     Returns:
-        ``avoidable`` of both kinds, and a count per outcome and kind; None in all when the game was not judged.
+        ``avoidable`` of both kinds, of them ``avoidable_driven`` of boats that the game drove, and a count per outcome
+        and kind; None in all when the game was not judged.
     """
-    found = None if breaches is None else sum(breach["verdict"] == AVOIDABLE for breach in breaches)
-    return {"avoidable": found} | {
+    found = None if breaches is None else [breach for breach in breaches if breach["verdict"] == AVOIDABLE]
+    driven = None if found is None else sum(bool(breach.get("driven")) for breach in found)
+    return {"avoidable": None if found is None else len(found), "avoidable_driven": driven} | {
         verdict_column(verdict, kind, radius_m): None if breaches is None else _number(breaches, kind, verdict)
         for kind, _ in KINDS
         for verdict in _COUNTED

@@ -209,6 +209,12 @@ def test_hits_of_boats_that_the_game_drives_stand_beside_the_goals_and_miss_none
     assert "(beside 8 of boats that the game drives)" in shown
     assert "8 of boats that the game drives" in goals_lines([mates])[2]
     assert "8 of boats that the game drives" in goal_rows([mates])[0]["name"]
+    judged = [{**row, "avoidable": 3 if row["shielded"] else None, "avoidable_driven": 3} for row in rows]
+    (told,) = (goal for goal in goals(judged) if goal["name"].startswith("avoidable"))
+    assert (told["value"], told["met"], told["note"]) == (0.0, True, "beside 12 of boats that the game drives")
+    judged[1]["avoidable_driven"] = 2
+    (told,) = (goal for goal in goals(judged) if goal["name"].startswith("avoidable"))
+    assert (told["value"], told["met"]) == (0.25, False)
     one_more = [{**row, "breaches_teammate_2.5m": row["breaches_teammate_2.5m"] + row["shielded"]} for row in rows]
     assert (goals(one_more)[0]["value"], goals(one_more)[0]["met"]) == (4.0, False)
     assert all("note" not in goal for goal in goals(played.rows)), "none is driven in three seconds"

@@ -125,7 +125,10 @@ def test_a_made_up_meeting_is_judged_as_seen_by_the_team(game_meta):
 
 def test_what_the_game_drove_is_the_games(game_meta):
     log, params, record = head_on(game_meta, driven=True)
-    assert judge_game(log, params, record, side=1)[0]["responsible"] == "game"
+    (entry,) = judge_game(log, params, record, side=1)
+    assert (entry["responsible"], entry["driven"]) == ("game", True)
+    assert judge_game(*head_on(game_meta), side=1)[0]["driven"] is False
+    assert verdict_columns([{**entry, "verdict": "avoidable"}], 2.5)["avoidable_driven"] == 1
 
 
 def test_beyond_the_most_breaches_nothing_is_judged(game_meta, monkeypatch):
