@@ -1,4 +1,7 @@
-"""Whether a shield fits the game it is put on; what a wrapper relies on is checked here, or taken from the game."""
+"""Whether a shield fits the game it is put on, and serves nobody else: it remembers the boats it decides for.
+
+What a wrapper relies on is checked here, or taken from the game.
+"""
 
 from __future__ import annotations
 
@@ -125,4 +128,30 @@ def refuse_second(env: Any, kind: type, team: int, shield: Any) -> None:
         side = ("blue", "red")[team]
         raise ConfigError(
             f"the {side} team of this environment has a shield already; wrap env.unwrapped, or shield the other team"
+        )
+
+
+def begin_serving(shield: Any) -> object:
+    """Let a shield forget all, and return what shows that it serves whoever holds it; deciders of users' own too."""
+    shield.reset()
+    holder = object()
+    if isinstance(shield, Shield):
+        shield.serves = holder
+    return holder
+
+
+def check_serving(shield: Any, holder: object) -> None:
+    """Refuse a shield that has begun to serve another team or game since; one that serves nobody serves the holder now.
+
+    Raises:
+        ConfigError: it has.
+    """
+    if not isinstance(shield, Shield):
+        return
+    if shield.serves is None:  # somebody reset it
+        shield.serves = holder
+    if shield.serves is not holder:
+        raise ConfigError(
+            "this shield has begun to serve another team or game since this one's reset; give each a Shield of its "
+            "own, or reset() it between them"
         )

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,10 +20,55 @@ LEAST_MPS = 1e-6
 """A boat is taken to move at least so fast, so that a time to anywhere is finite."""
 
 
-def time_until(position: Array, places: Array, radius_m: float, fastest_mps: Any) -> Array:
-    """Time, s, before which boats (..., 2) that go no faster cannot be within a radius of any of the places (k, 2)."""
-    distance_m = _distances(position, places).min(axis=-1)
-    return np.asarray(np.maximum(0.0, distance_m - radius_m) / np.maximum(fastest_mps, LEAST_MPS))
+class Drives(NamedTuple):
+    """How a game drives the n boats of two teams, blue first.
+
+    Attributes:
+        marks: for each team, places (k, 2), m: its tagged boats are steered at the nearest.
+        ends: for each team, places (k, 2), m, near which tagged boats are free again.
+        near_m: how near that is; NaN: nobody knows the way of tagged boats, such as among obstacles.
+        size: of the field, m; boats out of bounds are steered straight off the nearest edge.
+        tagged_mps: speed, m/s, commanded to tagged boats, (n,) or one for all,
+        oob_mps: and to boats out of bounds.
+    """
+
+    marks: Sequence[Array]
+    ends: Sequence[Array]
+    near_m: float
+    size: Array
+    tagged_mps: Array
+    oob_mps: Array
+
+
+class Driven(NamedTuple):
+    """Which boats (..., n) the game drives now, and for how long yet, s, those are stopped that are disabled."""
+
+    tagged: BoolArray
+    oob: BoolArray
+    disabled: BoolArray
+    disabled_for_s: Array
+
+
+def driven_rows(drives: Drives, driven: Driven, state: Array, team: Any) -> Array | None:
+    """Rows of `Fleet.driven`, (..., n, 4), of boats at a state (..., n, N_STATE); None where none is driven."""
+    tagged, oob, disabled, disabled_for_s = driven
+    if not (tagged | oob | disabled).any():
+        return None
+    rows, position = np.full((*tagged.shape, 4), np.nan), state[..., [L.X, L.Y]]
+    home_mps = np.where(oob, np.minimum(drives.tagged_mps, drives.oob_mps), drives.tagged_mps)
+    back_mps = np.broadcast_to(drives.oob_mps, oob.shape)
+    for number in (0, 1) if not math.isnan(drives.near_m) else ():
+        here = tagged & ~disabled & (team == number)
+        rows[here, SPEED], rows[here, PLACE] = home_mps[here], nearest(position[here], drives.marks[number])
+        distance_m = _distances(position[here], drives.ends[number]).min(axis=-1)
+        fastest_mps = np.maximum(np.maximum(home_mps[here], state[here][:, L.SPEED]), LEAST_MPS)
+        rows[here, UNTIL] = np.maximum(0.0, distance_m - drives.near_m) / fastest_mps
+    here = oob & ~tagged & ~disabled
+    places, beyond_m = inwards(position[here], drives.size)
+    rows[here, SPEED], rows[here, PLACE] = back_mps[here], places
+    rows[here, UNTIL] = beyond_m / np.maximum(np.maximum(back_mps[here], state[here][:, L.SPEED]), LEAST_MPS)
+    rows[disabled, SPEED], rows[disabled, UNTIL] = 0.0, disabled_for_s[disabled]
+    return rows
 
 
 def nearest(position: Array, places: Array) -> Array:
@@ -41,55 +88,24 @@ def inwards(position: Array, size: Array) -> tuple[Array, Array]:
 
 
 def driven_boats(core: Any) -> Array | None:
-    """Rows of `Fleet.driven` for each of the B games of a `BatchedMctf`, (B, n, 4); None where they drive no boat.
-
-    Of tagged boats among obstacles nothing is said: the game leads them past those.
-    """
-    tagged, oob, disabled = core.is_tagged, core.oob, core.is_disabled
-    if not (tagged | oob | disabled).any():
+    """Rows of `Fleet.driven` for each of the B games of a `BatchedMctf`, (B, n, 4); None where they drive no boat."""
+    if not (core.is_tagged | core.oob | core.is_disabled).any():
         return None
-    rows = np.full((*tagged.shape, 4), np.nan)
-    if core.config.n_obstacles == 0:
-        _drive_home(core, tagged & ~disabled, rows)
-    _drive_in(core, oob & ~tagged & ~disabled, rows)
-    _let_coast(core, disabled, rows)
-    return rows
-
-
-def _let_coast(core: Any, where: BoolArray, rows: Array) -> None:
-    """Disabled boats, until the power play that stops them ends."""
-    rules, game = core.rules, np.nonzero(where)[0]
-    ends_s = (core.power_start[game, core.team[np.nonzero(where)[1]]] + rules.power_length) * rules.decision_s
-    left_s = ends_s - core.time_s[game]
-    rows[where, SPEED] = 0.0
-    rows[where, UNTIL] = np.where(left_s < 0.0, np.inf, left_s)
-
-
-def _drive_home(core: Any, where: BoolArray, rows: Array) -> None:
-    """Tagged boats: to their own flag's home, or where there are corners to the nearer of their marks."""
-    config, corners = core.config, core.config.untag_at == "own_corners"
+    config, rules, corners = core.config, core.rules, core.config.untag_at == "own_corners"
+    marks = rules.corner_marks if corners else core.flag_home[:, np.newaxis]
     radius_m = config.corner_radius_m if corners else config.catch_radius_m
-    share = np.where(core.oob, config.oob_speed_frac, 1.0)
-    if config.tag_speed_frac < 1.0:
-        share = np.minimum(share, config.tag_speed_frac)
-    for team in (0, 1):
-        here = where & (core.team == team)
-        marks = core.rules.corner_marks[team] if corners else core.flag_home[team][np.newaxis]
-        ends = core.rules.corners[team] if corners else marks
-        position, speed_mps = core.state[here][:, [L.X, L.Y]], core.state[here][:, L.SPEED]
-        commanded_mps = (core.max_speed_mps * share)[here]
-        rows[here, SPEED] = commanded_mps
-        rows[here, PLACE] = nearest(position, marks)
-        rows[here, UNTIL] = time_until(position, ends, radius_m, np.maximum(commanded_mps, speed_mps))
-
-
-def _drive_in(core: Any, where: BoolArray, rows: Array) -> None:
-    """Boats out of bounds: straight off the nearest edge."""
-    commanded_mps = (core.max_speed_mps * core.config.oob_speed_frac)[np.nonzero(where)[1]]
-    places, beyond_m = inwards(core.state[where][:, [L.X, L.Y]], core.field.size)
-    rows[where, SPEED] = commanded_mps
-    rows[where, PLACE] = places
-    rows[where, UNTIL] = beyond_m / np.maximum(np.maximum(commanded_mps, core.state[where][:, L.SPEED]), LEAST_MPS)
+    drives = Drives(
+        marks,
+        rules.corners if corners else marks,
+        radius_m if config.n_obstacles == 0 else math.nan,
+        core.field.size,
+        core.max_speed_mps * min(config.tag_speed_frac, 1.0),
+        core.max_speed_mps * config.oob_speed_frac,
+    )
+    ends_s = (core.power_start[:, core.team] + rules.power_length) * rules.decision_s
+    left_s = ends_s - core.time_s[:, np.newaxis]
+    driven = Driven(core.is_tagged, core.oob, core.is_disabled, np.where(left_s < 0.0, np.inf, left_s))
+    return driven_rows(drives, driven, core.state, core.team)
 
 
 def _distances(position: Array, places: Array) -> Array:

@@ -13,11 +13,10 @@ from ..jit import Array
 from ..platforms import get_platform
 from ..shield import Shield
 from .actions import DISCRETE
-from .checks import check_unchanged, facts_now, refuse_second, shield_for, words_of
+from .checks import begin_serving, check_serving, check_unchanged, facts_now, refuse_second, shield_for, words_of
 from .game_facts import GameFacts
 from .readers import reader_of
 from .reading import GameReader, one_game_shield, parallel_game, team_number
-from .serving import begin_serving, check_serving
 
 
 class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[misc] # pettingzoo has no types
@@ -39,7 +38,7 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         keep_out: keep clear of the own flag's circle, in which the game stops boats.
         reader: what reads the game, such as sensors that err; None: the env's own state, exact.
         masks: also leave ``infos[agent]["action_mask"]``: (17,) int8, 1 for each discrete action that the shield would
-            let pass in the next step, beside team-mates that choose the same; all 1 where none does.
+            let pass in the next step, beside team-mates that go straight on; all 1 where none does.
 
     Attributes:
         shield: the shield at work: the one given, or, if the game's boats collide farther apart than it keeps them and

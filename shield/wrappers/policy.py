@@ -13,11 +13,10 @@ from ..decision import Decisions
 from ..exceptions import ConfigError, FleetError, PolicyError
 from ..fleet import Fleet
 from ..shield import Shield
-from .checks import check_unchanged, facts_now, shield_for, words_of
+from .checks import begin_serving, check_serving, check_unchanged, facts_now, shield_for, words_of
 from .game_facts import GameFacts
 from .readers import reader_of
 from .reading import GameReader, one_game_shield
-from .serving import begin_serving, check_serving
 
 logger = logging.getLogger(__name__)
 

@@ -103,7 +103,7 @@ class PyquaticusReader:
             self._platforms,
             ours,
             self.agent_ids,
-            driven=driven_players(self.env, players),
+            driven=driven_players(self.env, players, state, teams),
             visiting=np.array([not getattr(player, "on_own_side", True) for player in players], np.bool_),
         )
 

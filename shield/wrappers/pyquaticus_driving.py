@@ -8,66 +8,46 @@ from typing import Any
 
 import numpy as np
 
-from ..jit import Array
-from .driving import LEAST_MPS, inwards, nearest, time_until
-
-UNKNOWN = (math.nan, math.nan, math.nan, math.nan)
-Row = tuple[float, float, float, float]
+from ..jit import Array, IntArray
+from .driving import Driven, Drives, driven_rows
 
 
-def driven_players(env: Any, players: Sequence[Any]) -> Array | None:
-    """Rows of `Fleet.driven` of all players; None where the environment drives none.
+def driven_players(env: Any, players: Sequence[Any], state: Array, team: IntArray) -> Array | None:
+    """Rows of `Fleet.driven` of all players; None where the environment drives none."""
+    tagged, oob, disabled = (
+        np.array([bool(getattr(player, name, False)) for player in players])
+        for name in ("is_tagged", "oob", "is_disabled")
+    )
+    if not (tagged | oob | disabled).any():
+        return None
+    disabled_for_s = np.array([_disabled_for_s(env, int(number)) for number in team])
+    return driven_rows(_drives(env, players), Driven(tagged, oob, disabled, disabled_for_s), state, team)
 
-    Of tagged boats among obstacles nothing is said: it leads them past those by a random planner.
+
+def _drives(env: Any, players: Sequence[Any]) -> Drives:
+    """Home is the own flag's, or where there are corners the nearer of their marks.
+
+    It leads tagged boats past obstacles by a random planner, and of versions without the radius nobody knows when they
+    are home.
     """
-    rows = np.array([_row(env, player) for player in players])
-    return None if np.isnan(rows[:, 0]).all() else rows
+    marks = [getattr(env, name, None) for name in ("blue_untag_coords", "red_untag_coords")]
+    homes = [np.array([flag.home], dtype=np.float64) for flag in env.flags]
+    corners = any(one is not None for one in marks)
+    ends = ((env.env_ul, env.env_ll), (env.env_ur, env.env_lr)) if corners else homes
+    near_m = float(env.untag_radius if corners else getattr(env, "catch_radius", math.nan))
+    top_mps = np.array([float(player.get_max_speed()) for player in players])
+    return Drives(
+        [np.asarray(one, dtype=np.float64) for one in (marks if corners else homes)],
+        [np.asarray(one, dtype=np.float64) for one in ends],
+        math.nan if getattr(env, "obstacles", ()) else near_m,
+        np.asarray(env.env_size, dtype=np.float64),
+        top_mps * float(getattr(env, "tag_speed_frac", 1.0)),
+        top_mps * float(getattr(env, "oob_speed_frac", 1.0)),
+    )
 
 
-def _row(env: Any, player: Any) -> Row:
-    if getattr(player, "is_disabled", False):
-        return 0.0, math.nan, math.nan, _disabled_for_s(env, player)
-    if player.is_tagged:
-        return UNKNOWN if getattr(env, "obstacles", ()) else _home(env, player)
-    return _in(env, player) if player.oob else UNKNOWN
-
-
-def _fraction(env: Any, name: str) -> float:
-    return float(getattr(env, name, 1.0))
-
-
-def _home(env: Any, player: Any) -> Row:
-    """A tagged boat: to its own flag's home, or where there are corners to the nearer of their marks."""
-    team, (x, y) = int(getattr(player.team, "value", player.team)), player.pos
-    speed = float(player.get_max_speed()) * _fraction(env, "tag_speed_frac")
-    if player.oob:
-        speed = min(speed, float(player.get_max_speed()) * _fraction(env, "oob_speed_frac"))
-    marks = getattr(env, ("blue_untag_coords", "red_untag_coords")[team], None)
-    if marks is None:
-        marks = ends = (env.flags[team].home,) * 2
-        radius_m = float(getattr(env, "catch_radius", math.nan))
-    else:
-        ends = (env.env_ul, env.env_ll) if team == 0 else (env.env_ur, env.env_lr)
-        radius_m = float(env.untag_radius)
-    if math.isnan(radius_m):  # of another version: nobody knows when it is home
-        return UNKNOWN
-    position = np.array((x, y), dtype=np.float64)
-    mark = nearest(position, np.asarray(marks, dtype=np.float64))
-    until_s = time_until(position, np.asarray(ends, dtype=np.float64), radius_m, max(speed, float(player.speed)))
-    return speed, float(mark[0]), float(mark[1]), float(until_s)
-
-
-def _in(env: Any, player: Any) -> Row:
-    """A boat out of bounds: straight off the nearest edge."""
-    speed = float(player.get_max_speed()) * _fraction(env, "oob_speed_frac")
-    position, size = np.asarray(player.pos, dtype=np.float64)[:2], np.asarray(env.env_size, dtype=np.float64)
-    place, beyond_m = inwards(position, size)
-    return speed, float(place[0]), float(place[1]), float(beyond_m) / max(speed, float(player.speed), LEAST_MPS)
-
-
-def _disabled_for_s(env: Any, player: Any) -> float:
-    """Time until the power play that stops a boat ends, s; 0, which is to say nothing, where it is not told."""
-    team = int(getattr(player.team, "value", player.team))
+def _disabled_for_s(env: Any, team: int) -> float:
+    """Time until the power play that stops a team's boats ends, s; 0, which is to say nothing, where it is not told."""
     start = getattr(env, ("blue_power_start", "red_power_start")[team], None)
     length = getattr(env, "power_play_length", None)
     if start is None or length is None:

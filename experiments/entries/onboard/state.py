@@ -9,9 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from steerclear.shield.fleet import Fleet
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.wrappers.driving import LEAST_MPS, inwards, nearest, time_until
+from steerclear.shield.wrappers.driving import Driven, Drives, driven_rows
 
-UNKNOWN = (math.nan, math.nan, math.nan, math.nan)
 NORMALISED_M = 1.5
 """Where no boat is farther than this from (0, 0), m, the state is normalised, and tells no metres."""
 
@@ -84,41 +83,17 @@ def fleet_of(spec: GameSpec, observed: Observation, team: int, disabled_for_s: A
     """The fleet to decide for: the team's boats but those that the game drives."""
     half = len(spec.agent_ids) // 2
     teams = np.array([0] * half + [1] * half)
-    driven = observed.tagged | observed.oob | observed.disabled
-    rows = None
-    if driven.any():
-        rows = np.array([_drive(spec, observed, i, int(teams[i]), disabled_for_s[i]) for i in range(2 * half)])
-    ours = (teams == team) & ~driven
+    driven = Driven(observed.tagged, observed.oob, observed.disabled, np.asarray(disabled_for_s))
+    rows = driven_rows(_drives(spec), driven, observed.rows, teams)
+    ours = (teams == team) & ~(driven.tagged | driven.oob | driven.disabled)
     return Fleet(observed.rows, teams, spec.platforms, ours, spec.agent_ids, driven=rows, visiting=observed.visiting)
 
 
-def _drive(
-    spec: GameSpec, observed: Observation, i: int, team: int, disabled_for_s: float
-) -> tuple[float, float, float, float]:
-    """What drives a boat, as in `Fleet.driven`."""
-    if observed.disabled[i]:
-        return 0.0, math.nan, math.nan, disabled_for_s
-    if observed.tagged[i]:
-        return _home(spec, observed, i, team)
-    return _in(spec, observed, i) if observed.oob[i] else UNKNOWN
-
-
-def _home(spec: GameSpec, observed: Observation, i: int, team: int) -> tuple[float, float, float, float]:
-    position, speed = observed.rows[i, [L.X, L.Y]], float(observed.rows[i, L.SPEED])
-    share = min(spec.tag_share, spec.oob_share) if observed.oob[i] else spec.tag_share
-    commanded = share * _top_mps(spec, i)
-    mark = nearest(position, np.array(spec.marks[team], dtype=np.float64))
-    until_s = time_until(position, np.array(spec.ends[team]), spec.untag_m, max(commanded, speed))
-    return commanded, float(mark[0]), float(mark[1]), float(until_s)
-
-
-def _in(spec: GameSpec, observed: Observation, i: int) -> tuple[float, float, float, float]:
-    speed, commanded = float(observed.rows[i, L.SPEED]), spec.oob_share * _top_mps(spec, i)
-    place, beyond_m = inwards(observed.rows[i, [L.X, L.Y]], np.array(spec.size))
-    return commanded, float(place[0]), float(place[1]), float(beyond_m) / max(commanded, speed, LEAST_MPS)
-
-
-def _top_mps(spec: GameSpec, i: int) -> float:
+def _drives(spec: GameSpec) -> Drives:
+    """How the game drives boats."""
     from steerclear.shield.platforms import get_platform
 
-    return float(get_platform(spec.platforms[i]).max_speed_mps)
+    top_mps = np.array([float(get_platform(name).max_speed_mps) for name in spec.platforms])
+    marks, ends = ([np.array(one, dtype=np.float64) for one in places] for places in (spec.marks, spec.ends))
+    tagged_mps, oob_mps = top_mps * spec.tag_share, top_mps * spec.oob_share
+    return Drives(marks, ends, spec.untag_m, np.array(spec.size), tagged_mps, oob_mps)
