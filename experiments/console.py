@@ -147,8 +147,8 @@ def command(**defaults: Any) -> Callable[[Callable[..., Any]], Callable[..., Any
             except Exception as error:
                 leave_failed(error)
 
-        del guarded.__wrapped__  # type: ignore[attr-defined]  # options are those here, not the function's own
-        guarded.__signature__ = inspect.Signature(options)  # type: ignore[attr-defined]
+        vars(guarded).pop("__wrapped__")  # options are those here, not the function's own
+        vars(guarded)["__signature__"] = inspect.Signature(options)
         guarded.__annotations__ = {option.name: option.annotation for option in options}
         guarded.__doc__ = unbroken(function.__doc__ or "")
         return guarded

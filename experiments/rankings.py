@@ -158,7 +158,7 @@ def standings(totals: Totals, penalty: float, seed: int) -> list[dict[str, Any]]
         seed: of the bootstrap.
     """
     sums = totals.sums()
-    found = {
+    found: dict[str, Any] = {
         "rank": ranks_of(sums, penalty).astype(int),
         "score": score_of(sums, penalty),
         **{f"score_{weight:g}": score_of(sums, weight) for weight in WEIGHTS},
