@@ -185,6 +185,8 @@ def parse_packet(data: bytes) -> Packet:
 
 def _fix(entry: Any) -> Fix:
     boat = check_name(entry.get("boat") if isinstance(entry, dict) else entry, "boat")
+    if not isinstance(entry, dict):
+        raise FeedError(f"contact {boat} is a text; give an object with its boat, place, heading and speed")
     for key, values in NOT_AVAILABLE.items():
         if type(entry.get(key)) in (int, float) and entry[key] in values:
             text = f'{key} is {entry[key]}, which means "not available"; leave the boat out until it is known'
