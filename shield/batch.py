@@ -15,6 +15,7 @@ from .exceptions import ConfigError, FleetError
 from .filter.program import solver_of
 from .fleet import LARGEST, LARGEST_SPEED_MPS
 from .jit import Array, BoolArray
+from .masks import passing
 from .model import boats_of
 from .platforms import Platform
 from .platforms import layout as L
@@ -127,27 +128,60 @@ class BatchedShield:
         Raises:
             FleetError: an array has the wrong shape or holds no numbers, or a state is not finite.
         """
-        games = self.reason.shape
-        state = _shaped("state", state, (*games, L.N_STATE), numbers)
-        wanted = _shaped("wanted", wanted, (*games, 2), numbers)
-        ours = _shaped("ours", ours, games, truths)
-        if not (np.abs(state[:, :, : L.SPEED_ERROR]) <= LARGEST).all() or (np.abs(state) > LARGEST).any():
-            raise FleetError(f"a boat's position, heading, speed, thrust or rudder is not finite or beyond {LARGEST:g}")
-        if (np.abs(state[:, :, L.SPEED]) > LARGEST_SPEED_MPS).any():
-            raise FleetError(f"a boat's speed is beyond {LARGEST_SPEED_MPS:g} m/s; no boat of a game goes so fast")
+        self._give(state, ours, visiting, driven)
         given = self._deciders.scene.given
-        given[:, :, : L.N_STATE], given[:, :, W.NOMINAL_SPEED : W.NOMINAL_TURN + 1], given[:, :, W.OURS] = (
-            state,
-            wanted,
-            ours,
-        )
-        given[:, :, W.VISITING] = False if visiting is None else _shaped("visiting", visiting, games, truths)
-        given[:, :, W.DRIVEN :] = np.nan if driven is None else _shaped("driven", driven, (*games, 4), numbers)
-        given[:, :, W.HORIZON_S] = np.nan
+        given[:, :, W.NOMINAL_SPEED : W.NOMINAL_TURN + 1] = _shaped("wanted", wanted, (*self.reason.shape, 2), numbers)
         self._barriers.renew()
         self._deciders.decide(self._static)
         self._barriers.tell()
         return self.sent
+
+    def _give(self, state: Array, ours: BoolArray, visiting: BoolArray | None, driven: Array | None) -> None:
+        """Write all but the commands into the scene.
+
+        Raises:
+            FleetError: see `decide`.
+        """
+        games, given = self.reason.shape, self._deciders.scene.given
+        state = _shaped("state", state, (*games, L.N_STATE), numbers)
+        if not (np.abs(state[:, :, : L.SPEED_ERROR]) <= LARGEST).all() or (np.abs(state) > LARGEST).any():
+            raise FleetError(f"a boat's position, heading, speed, thrust or rudder is not finite or beyond {LARGEST:g}")
+        if (np.abs(state[:, :, L.SPEED]) > LARGEST_SPEED_MPS).any():
+            raise FleetError(f"a boat's speed is beyond {LARGEST_SPEED_MPS:g} m/s; no boat of a game goes so fast")
+        given[:, :, : L.N_STATE], given[:, :, W.OURS] = state, _shaped("ours", ours, games, truths)
+        given[:, :, W.VISITING] = False if visiting is None else _shaped("visiting", visiting, games, truths)
+        given[:, :, W.DRIVEN :] = np.nan if driven is None else _shaped("driven", driven, (*games, 4), numbers)
+        given[:, :, W.HORIZON_S] = np.nan
+
+    def safe_actions(
+        self,
+        state: Array,
+        actions: Array,
+        ours: BoolArray,
+        visiting: BoolArray | None = None,
+        driven: Array | None = None,
+    ) -> BoolArray:
+        """Which of k candidate commands would pass as they are in this step, (B, n, k); see `masks`.
+
+        Args:
+            state: as all others but the actions as of `decide`.
+            actions: (B, n, k, 2) speed m/s and relative heading deg; all pass of boats not decided for.
+            ours: as of `decide`.
+            visiting: as of `decide`.
+            driven: as of `decide`.
+
+        Raises:
+            FleetError: no candidates, or as `decide`.
+        """
+        self._give(state, ours, visiting, driven)
+        asked = np.shape(actions)
+        if len(asked) != 4 or asked[2] < 1:
+            raise FleetError(f"actions has shape {asked}; expected {(*self.reason.shape, 'k', 2)}, k one at least")
+        candidates = _shaped("actions", actions, (*self.reason.shape, asked[2], 2), numbers)
+        self._barriers.renew()
+        passes = passing(self._deciders, self._static, candidates)
+        self._barriers.tell()
+        return passes
 
     def filter_for(self, team: int, shield_autopilot: bool = True) -> Any:
         """Command filter for a batched game: ``step(actions, command_filter=shield.filter_for(0))``.

@@ -327,11 +327,16 @@ class Deciders:
         memories[which, :, W.HAS_BACKUP], memories[which, :, W.BACKING_UP] = 0.0, 0.0
         pending[which] = np.nan
 
-    def decide(self, static: Static) -> None:
-        """Write into the scene what is decided about what is given, beside these static constraints."""
+    def beside(self, static: Static) -> Scene:
+        """The scene with these static constraints, from now on."""
         if self.scene.static is not static:
             self.scene = share(self.scene._replace(static=static))
             self._decide_all = None
+        return self.scene
+
+    def decide(self, static: Static) -> None:
+        """Write into the scene what is decided about what is given, beside these static constraints."""
+        self.beside(static)
         if self._solver is None:
             if self._decide_all is None:
                 made = getattr(decide_all, "compile", None)  # there is none where NUMBA_DISABLE_JIT is set

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Callable, Sequence
+from copy import deepcopy
 from functools import lru_cache
 from typing import Any
 
@@ -22,6 +23,7 @@ from .exceptions import ConfigError, FleetError
 from .filter.program import Solver, solver_of
 from .fleet import Fleet
 from .jit import Array, BoolArray, IntArray
+from .masks import passing
 from .model import boats_of, missing_tables
 from .platforms import layout as L
 from .surroundings import OPEN_WATER, Surroundings, off_m
@@ -194,10 +196,10 @@ class Shield:
     def safe_actions(
         self, fleet: Fleet, actions: Sequence[Commands], surroundings: Surroundings | None = None
     ) -> BoolArray:
-        """Which of k candidate commands would pass as they are in this step, (n, k); see `wrappers.masks`.
+        """Which of k candidate commands would pass as they are in this step, (n, k); see `masks`.
 
-        Each boat's candidate is judged beside its team-mates' candidates of the same number. It is for this step alone,
-        and the shield stays behind it. What the shield remembers is left alone.
+        Each boat's candidates are judged beside team-mates that go straight on. It is for this step alone, and the
+        shield stays behind it. What the shield remembers is left alone.
 
         Args:
             fleet: all boats seen now.
@@ -206,10 +208,38 @@ class Shield:
 
         Raises:
             FleetError: no candidates, or as `decide`.
+            ConfigError: as `decide`.
         """
-        from .wrappers.masks import safe_of_fleet
+        if isinstance(actions, Commands) or not len(actions):
+            raise FleetError("actions are one Commands or none; give a list of them, one for each candidate")
+        for candidate in actions:
+            _check(fleet, candidate)
+        around = self.surroundings if surroundings is None else surroundings
+        same = self._known is not None and self._known[0] == _boats_in(fleet)
+        asked = self if same and self._static(around) is self._kept_from else deepcopy(self)
+        return asked._passing(fleet, actions, around)
 
-        return safe_of_fleet(self, fleet, actions, surroundings)
+    def _passing(self, fleet: Fleet, actions: Sequence[Commands], around: Surroundings) -> BoolArray:
+        order = order_of(fleet.names)
+        place = np.argsort(order)
+        boats, deciders = self._deciders_of(fleet, order)
+        check_ages(fleet, self.config)
+        candidates, whole = np.empty((len(fleet), len(actions), 2)), np.ones((len(fleet), len(actions)), np.bool_)
+        for k, candidate in enumerate(actions):
+            within, cut = within_limits(candidate, fleet.names, fleet.controlled, boats.params[place, L.MAX_SPEED])
+            candidates[:, k] = within.as_relative_deg(fleet.state[:, L.HEADING])
+            whole[:, k] = True if cut is None else ~cut
+        believed = deepcopy(self._autopilots)
+        state, _ = self._with_memory(fleet, order)
+        self._autopilots = believed  # what is asked here is not sent: nothing goes on from it
+        self._give(fleet, state[place], actions[0], order, deciders.scene.given)
+        self._barriers.renew()
+        each = np.repeat(candidates[order][np.newaxis], len(deciders.scene.given), axis=0)
+        found = passing(deciders, self._around(around, deciders), each)
+        self._barriers.tell()
+        own = np.arange(len(fleet))
+        passes: BoolArray = found[0] if self.config.coordination == "team" else found[own, own]
+        return passes[place] & whole
 
     def wrap(self, policy: Any, read: Callable[[Any], Fleet] | None = None) -> Any:
         """Put this shield around a policy.
@@ -228,7 +258,7 @@ class Shield:
 
     def _deciders_of(self, fleet: Fleet, order: IntArray) -> tuple[Boats, Deciders]:
         """Boat constants and deciders of a fleet; what is remembered of boats that stay is theirs in a new fleet."""
-        known = fleet.platforms, fleet.names, fleet.team.tobytes()
+        known = _boats_in(fleet)
         if self._boats is None or self._deciders is None or self._known is None or self._known[0] != known:
             platforms, team = tuple(fleet.platforms[i] for i in order), tuple(int(fleet.team[i]) for i in order)
             boats = boats_of(self.config, platforms, team)
@@ -337,6 +367,11 @@ def _check(fleet: Fleet, wanted: Commands) -> None:
     fleet.check()
     if wanted.values.shape != (len(fleet), 2):
         raise FleetError(f"commands of shape {wanted.values.shape} for {len(fleet)} boats; give one row per boat")
+
+
+def _boats_in(fleet: Fleet) -> tuple[Any, ...]:
+    """What tells the boats of one fleet from those of another."""
+    return fleet.platforms, fleet.names, fleet.team.tobytes()
 
 
 def barriers_of(config: ShieldConfig) -> KeptBarriers:

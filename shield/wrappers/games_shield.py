@@ -17,7 +17,6 @@ from .game_facts import (
     warn_of_distances,
     with_distances,
 )
-from .masks import BatchedMasks
 from .mctf import surroundings_of
 from .reading import team_number
 
@@ -72,7 +71,6 @@ class GamesFilter:
     def __init__(self, shield: BatchedShield, team: int, shield_autopilot: bool) -> None:
         self.shield, self.team, self.shield_autopilot = shield, team, shield_autopilot
         self._checked: Any = None
-        self._masks: BatchedMasks | None = None
 
     def __call__(self, core: Any, commands: Array) -> Array:
         """Safe commands (B, n, 2) for games that the shield was built for.
@@ -95,8 +93,6 @@ class GamesFilter:
         return ours, ~core.on_side, driven_boats(core)
 
     def safe_actions(self, core: Any, actions: Array) -> BoolArray:
-        """Which candidates (B, n, k, 2) would pass in this step, (B, n, k); see `wrappers.masks`."""
-        if self._masks is None or self._masks.candidates != actions.shape[2]:
-            self._masks = BatchedMasks(self.shield, actions.shape[2])
+        """Which candidates (B, n, k, 2) would pass in this step, (B, n, k); see `masks`."""
         ours, visiting, driven = self._about(core)
-        return self._masks.safe(core.state, actions, ours, visiting, driven)
+        return self.shield.safe_actions(core.state, actions, ours, visiting, driven)
