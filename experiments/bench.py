@@ -7,11 +7,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, NamedTuple
 
-from steerclear.shield import ShieldConfig
+import numpy as np
+from steerclear.shield import Shield, ShieldConfig
+from steerclear.shield.decide import begin, decide_all, take_up
+from steerclear.shield.workspace import Scene
 
 from .bench_measures import (
     COUNTS,
     BatchSize,
+    Question,
     batch_memory,
     decide_times,
     lookup_times,
@@ -21,6 +25,7 @@ from .bench_measures import (
     solver_times,
     steps_per_s,
 )
+from .jit import kernel
 from .metrics import RADII_M, judged
 from .play.spec import check_seed
 from .provenance import head_of
@@ -90,6 +95,12 @@ def run_bench(settings: BenchSettings, notice: Callable[[str], None] = lambda wo
     notice("one decision with value tables")
     looking_up = questions_of_games(settings.table_preset, settings.game_s, seed, shield)
     content["decide_by_table"] = decide_times(looking_up, shield, repeats)
+    notice("where the time of decisions goes")
+    content["stages"] = [
+        {"preset": rules, **row}
+        for rules, questions in ((preset, asked), (settings.table_preset, looking_up))
+        for row in stage_times(questions, shield, repeats)
+    ]
     notice("look-ups in a value table")
     content["lookups"] = lookup_times(settings.lookups, repeats, seed)
     notice("the same programs through every solver")
@@ -125,6 +136,14 @@ def bench_goals(content: Mapping[str, Any]) -> list[dict[str, Any]]:
     ]
 
 
+STAGES = {"passes": "pass, backups held", "searches": "pass after a search", "changes": "do not pass"}
+"""Kinds of decisions, in words: those whose nominal commands pass on the backups that are held; those that pass after a
+search for others; and those in which some command is short of something, so that backups, program and exact checks
+follow."""
+PARTS = ("all_us", "check_us", "rest_us", "python_us")
+"""Times of a decision: all, the nominal check, what follows it, and what stands round compiled code."""
+
+
 class BenchTable(NamedTuple):
     """A title, the heads of its columns and its rows, all text."""
 
@@ -140,6 +159,7 @@ def bench_tables(content: Mapping[str, Any]) -> list[BenchTable]:
     return [
         _decide(content, "decide", "3 boats and 3 opponents"),
         _decide(content, "decide_by_table", "with value tables (surveyors)"),
+        *([_stages(content)] if "stages" in content else []),  # results of 0.8.0 lack them
         BenchTable(
             f"One look-up in a value table, us ({lookups})",
             ("", "us"),
@@ -190,6 +210,20 @@ def _decide(content: Mapping[str, Any], key: str, about: str) -> BenchTable:
     return BenchTable(title, ("", "p50", "p99", "p99.9"), rows)
 
 
+def _stages(content: Mapping[str, Any]) -> BenchTable:
+    rows = [
+        [
+            f"{row['preset']}: {STAGES[row['kind']]}",
+            f"{row['share']:.1%}",
+            f"{row['time_share']:.1%}",
+            *(number_text(row[name]) for name in ("all_us", "check_us", "rest_us", "python_us")),
+        ]
+        for row in content["stages"]
+    ]
+    heads = ("", "share", "of time", "mean", "check", "after it", "Python")
+    return BenchTable("Where the time of decisions goes, means in us", heads, rows)
+
+
 def _agreement(row: Mapping[str, Any]) -> list[str]:
     solved, differs = row["solved"], row["differs"]
     return ["-" if solved is None else f"{solved:.1%}", "-" if differs is None else f"{differs:.0e}"]
@@ -197,3 +231,57 @@ def _agreement(row: Mapping[str, Any]) -> list[str]:
 
 def _quantiles(row: Mapping[str, Any]) -> list[str]:
     return [number_text(row[name]) for name in ("p50_us", "p99_us", "p99_9_us")]
+
+
+@kernel
+def _check(scene: Scene) -> int:
+    """The nominal check alone; how many groups of boats do not pass it."""
+    take_up(0, scene)
+    return begin(scene)
+
+
+def stage_times(games: Sequence[Sequence[Question]], config: ShieldConfig, repeats: int) -> list[dict[str, Any]]:
+    """Time the parts of every decision of real games.
+
+    Returns:
+        Per kind of decision, see `STAGES`: `kind`, `decisions`, `share` of them, `time_share` of all time; means in us
+        of the whole (`all_us`), of the nominal check (`check_us`), of what follows it (`rest_us`) and of what stands
+        round compiled code (`python_us`).
+    """
+    shield, found = Shield(config), list[tuple[int, list[float]]]()
+    for game in games:
+        shield.reset()
+        shield.decide(game[0].fleet, game[0].wanted, game[0].surroundings)  # makes working memory for the fleet
+        found += [_of_question(shield, question, repeats) for question in game[1:]]
+    kinds, times = np.array([kind for kind, _ in found]), np.array([spent for _, spent in found])
+    rows = []
+    for number, kind in enumerate(STAGES):
+        mine = times[kinds == number]
+        means = mine.mean(axis=0).tolist() if len(mine) else [0.0] * len(PARTS)
+        shares = {"share": len(mine) / len(times), "time_share": float(mine[:, 0].sum() / times[:, 0].sum())}
+        rows.append({"kind": kind, "decisions": len(mine), **shares, **dict(zip(PARTS, means, strict=True))})
+    return rows
+
+
+def _of_question(shield: Shield, question: Question, repeats: int) -> tuple[int, list[float]]:
+    """Number of the decision's kind, and times in us in the order of `PARTS`; the shield goes on as it does anyway."""
+    live = shield.remembered
+    before = {name: array.copy() for name, array in live.items()}
+    scene: Scene = shield._deciders.scene  # type: ignore[union-attr]
+
+    def timed(function: Callable[[], Any]) -> float:
+        spent = []
+        for _ in range(repeats):
+            for name, array in live.items():
+                array[...] = before[name]
+            begun_ns = time.perf_counter_ns()
+            function()
+            spent.append((time.perf_counter_ns() - begun_ns) / 1e3)
+        return float(np.median(spent))
+
+    whole_us = timed(lambda: shield.decide(question.fleet, question.wanted, question.surroundings))
+    check_us = timed(lambda: _check(scene))
+    kind = 2 if (scene.group >= 0).any() else int((scene.searched >= 0).any())
+    compiled_us = min(timed(lambda: decide_all(scene)), whole_us)
+    check_us = min(check_us, compiled_us)
+    return kind, [whole_us, check_us, compiled_us - check_us, whole_us - compiled_us]

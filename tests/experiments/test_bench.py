@@ -50,6 +50,14 @@ def test_everything_is_measured_and_documented(content):
     assert all(row["low"] <= row["median"] <= row["high"] for row in content["batch"])
     assert [(row["boats"], row["ours"]) for row in content["scaling"]] == [(4, 2), (8, 4)]
     assert content["memory"]["games_mib"] > 0.0
+    for preset in ("aamas2024", "mctf2025"):
+        rows = [row for row in content["stages"] if row["preset"] == preset]
+        assert [row["kind"] for row in rows] == ["passes", "searches", "changes"]
+        assert sum(row["decisions"] for row in rows) == 4 * 39
+        for part in ("share", "time_share"):
+            assert sum(row[part] for row in rows) == pytest.approx(1.0)
+        for row in rows:
+            assert row["all_us"] == pytest.approx(row["check_us"] + row["rest_us"] + row["python_us"])
     assert [row["what"] for row in content["lookups"]] == ["value", "value and gradient"]
     assert all(row["us"] > 0.0 and row["lookups"] == 1000 for row in content["lookups"])
     assert {"daqp", "osqp", "compiled projection"} <= {row["solver"] for row in content["solvers"]}
@@ -57,7 +65,7 @@ def test_everything_is_measured_and_documented(content):
 
 def test_figures_become_tables_and_a_page(content, tmp_path):
     titles = [table.title for table in bench_tables(content)]
-    assert len(set(titles)) == len(titles) == 7
+    assert len(set(titles)) == len(titles) == 8
     for table in bench_tables(content):
         assert all(len(row) == len(table.heads) for row in table.rows)
     write_json(tmp_path / "bench.json", content)
