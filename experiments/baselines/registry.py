@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import cache, partial
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
@@ -66,7 +66,7 @@ class Entry(NamedTuple):
     """
 
     make: Callable[..., Guard]
-    check: Callable[[Mapping[str, Any]], object] | None = None
+    check: Callable[[dict[str, Any]], object] | None = None
     of_config: bool = False
 
 

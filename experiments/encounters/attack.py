@@ -205,7 +205,7 @@ class _Hunt:
                 break
             found = judge_game(played, int(game))
             start_m = float(start_certificate_m(played)[game])
-            entry = {"closest_m": float(columns["closest_m"][game]), "breaches": int(hits[game])}
+            entry: dict[str, Any] = {"closest_m": float(columns["closest_m"][game]), "breaches": int(hits[game])}
             entry |= found | {"start_certificate_m": start_m, "responsible": side_name(found["responsible"])}
             self.judged.append(entry)
             if found["avoidable"]:

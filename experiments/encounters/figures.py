@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import BoolArray
 
@@ -20,6 +21,7 @@ QUANTILES = np.linspace(0.0, 1.0, 101)
 
 
 Of = Callable[[Columns], Any]
+Mask = Callable[[Columns], NDArray[Any]]
 
 
 class Figure(NamedTuple):
@@ -64,11 +66,11 @@ def _outside(c: Columns) -> BoolArray:
     return np.asarray(c["start_certificate_m"] >= 0.0)
 
 
-def _count(mask: Callable[[Columns], BoolArray]) -> Of:
+def _count(mask: Mask) -> Of:
     return lambda c: int(mask(c).sum())
 
 
-def _upper(mask: Callable[[Columns], BoolArray], of: Callable[[Columns], BoolArray] = _all) -> Of:
+def _upper(mask: Mask, of: Mask = _all) -> Of:
     """Upper limit of a probability, from how many of those there are."""
     return lambda c: upper_bound(int(mask(c).sum()), int(of(c).sum()))
 

@@ -110,12 +110,14 @@ class Scenes:
     def take(self, games: Sequence[int] | IntArray) -> Scenes:
         """Some of the games."""
         chosen = np.asarray(games, dtype=np.int64)
-        return replace(self, **{name: getattr(self, name)[chosen] for name in PER_GAME})
+        arrays: dict[str, Any] = {name: getattr(self, name)[chosen] for name in PER_GAME}
+        return replace(self, **arrays)
 
 
 def join(scenes: Sequence[Scenes]) -> Scenes:
     """Put batches of the same fleet into one."""
-    return replace(scenes[0], **{name: np.concatenate([getattr(part, name) for part in scenes]) for name in PER_GAME})
+    arrays: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in scenes]) for name in PER_GAME}
+    return replace(scenes[0], **arrays)
 
 
 def scene_content(scenes: Scenes, conditions: Conditions, **notes: Any) -> dict[str, Any]:
@@ -167,16 +169,17 @@ def scenes_of(content: Mapping[str, Any]) -> tuple[Scenes, Conditions]:
     if content["format"] != FORMAT:
         raise ConfigError(f"the scene has format {content['format']}; this version reads {FORMAT}")
     kinds = {"noise_seed": np.uint64, "number": np.int64}
+    arrays: dict[str, Any] = {
+        name: np.array(_mapped(content[name], _number_or_inf), dtype=kinds.get(name, np.float64)) for name in PER_GAME
+    }
+    box: Any = None if content["field"] is None else tuple(map(float, content["field"]))
     scenes = Scenes(
         family=str(content["family"]),
         platforms=tuple(content["platforms"]),
         team=np.array(content["team"], dtype=np.int64),
-        field=None if content["field"] is None else tuple(map(float, content["field"])),
+        field=box,
         length_s=float(content["length_s"]),
-        **{
-            name: np.array(_mapped(content[name], _number_or_inf), dtype=kinds.get(name, np.float64))
-            for name in PER_GAME
-        },
+        **arrays,
     )
     for wrong, words in _faults(scenes):
         if wrong:

@@ -129,7 +129,7 @@ class World(NamedTuple):
     state: Array
     seen: Array
     error: Array
-    seeds: Array
+    seeds: NDArray[np.uint64]
     goal_at: IntArray
     phase_at: IntArray
     first_goal_s: Array
@@ -231,9 +231,9 @@ def play(scenes: Scenes, guard: str | GuardMaker | Guard, conditions: Conditions
     Raises:
         SteerclearError: the guard cannot be made, or what it sends is not finite.
     """
-    safety_filter = (
-        build_guard(guard, scenes, conditions) if isinstance(guard, str) or not hasattr(guard, "decide") else guard
-    )
+    safety_filter: Any = guard
+    if isinstance(guard, str) or not hasattr(guard, "decide"):
+        safety_filter = build_guard(guard, scenes, conditions)
     world, steps, shape = _world(scenes, conditions), scenes.steps, (scenes.games, len(scenes.team))
     ours = np.broadcast_to(scenes.own, shape).copy()
     played = Trajectory(

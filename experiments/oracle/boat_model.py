@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, fields
 from itertools import pairwise
 from typing import Any
 
@@ -20,6 +20,7 @@ from .compiled import compiled
 from .verdict import OracleError
 
 Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 N_STATE = 11
 """Columns of a state row: x, y, heading, speed, thrust, rudder, speed error and integral, heading error and integral,
 turn rate."""
@@ -132,9 +133,10 @@ def _boat_of(row: list[float]) -> Boat:
     if not (0 <= row[0] < len(KINDS) and 2 <= size <= _MAP_POINTS):
         raise OracleError(f"a parameter row starts with kind {row[0]:g} and has {size} map points; check its columns")
     thrusts, speeds = row[_N_PLAIN + 1 :][:size], row[_N_PLAIN + 1 + _MAP_POINTS :][:size]
+    plain: dict[str, Any] = dict(zip([one.name for one in fields(Boat)][1:10], row[1:10], strict=True))
     return Boat(
         KINDS[int(row[0])],
-        *row[1:10],
+        **plain,
         speed_pid=(row[10], row[11], row[12], row[13]),
         speed_gain=row[14],
         heading_pid=(row[15], row[16], row[17], row[18]),

@@ -53,7 +53,7 @@ def compiled(function: F) -> F:
     numba renews its cache only when the function's own file changes. These functions are compiled into one another
     across files, so the stamp it compares covers the whole folder.
     """
-    dispatcher = njit(nogil=True, error_model="numpy")(function)
+    dispatcher: Any = njit(nogil=True, error_model="numpy")(function)
     with contextlib.suppress(RuntimeError, OSError):  # no folder can be written to: compiled at every start
         kept = _Kept(function)
         kept._cache_file._source_stamp = _stamp()

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .boat_model import MEMORY, N_STATE, Array, Boat, as_boats, replay, turned
+from .boat_model import MEMORY, N_STATE, Array, Boat, IntArray, as_boats, replay, turned
 from .search import Task, commands_of, search
 from .settings import AT_ONCE, DEFAULT, Level, Motion, Settings
 from .verdict import BreachVerdict, OracleError, Outcome, Plan, Verdict, responsible_of
@@ -155,7 +155,7 @@ class _Record:
         changed = min(step, first + delay)  # the first state that the first command looked at changes
         inside = gaps <= self.radius_m + ROUNDING_M
         asked = self._question(own, tracks, inside, end)
-        facts = {"own": own, "other": partner, "step": step, "radius_m": self.radius_m, "end_step": end}
+        facts: dict[str, Any] = {"own": own, "other": partner, "step": step, "radius_m": self.radius_m, "end_step": end}
         facts |= {"looked_back_s": (step - first) * self.dt_s, "last_step": None, "last_preventable_s": None}
         facts |= {"plan": None}
         if inside[:step, column].all():
@@ -387,7 +387,7 @@ class Question:
         return Plan(begin, commands[:, 0], commands[:, 1], absolute, path, closest_m)
 
 
-def _lengths(first_s: tuple[float, ...], steps: int, dt_s: float) -> NDArray[np.int64]:
+def _lengths(first_s: tuple[float, ...], steps: int, dt_s: float) -> IntArray:
     """Split a number of steps into choices: the first lengths as given, then the last one over and over."""
     lengths: list[int] = []
     left = steps

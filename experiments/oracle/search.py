@@ -10,11 +10,12 @@ the end: the first that stays clear ends the search.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .boat_model import DOWN, HOLD, UP, Array, command_of, step
+from .boat_model import DOWN, HOLD, UP, Array, IntArray, command_of, step
 from .compiled import compiled
 
 N_SPEEDS = 3
@@ -46,10 +47,10 @@ class Layer(NamedTuple):
     """Room for the states of a layer: rows, cells, rates, where each is from, and a hash table of the cells."""
 
     made: Array
-    keys: Array
+    keys: IntArray
     rates: Array
-    origin: Array
-    table: Array
+    origin: IntArray
+    table: IntArray
 
 
 @compiled
@@ -94,7 +95,7 @@ def _cell(s: Array, sizes: Array) -> int:
 
 
 @compiled
-def _slot(table: Array, keys: Array, key: int) -> int:
+def _slot(table: IntArray, keys: IntArray, key: int) -> int:
     """Place of a key in the hash table, or of the empty place where it belongs."""
     place = (key ^ (key >> 17)) & (table.size - 1)
     while table[place] >= 0 and keys[table[place]] != key:
@@ -166,7 +167,7 @@ def _nth(a: Array, k: int) -> float:
 
 
 @compiled
-def _choose(rates: Array, width: int) -> Array:
+def _choose(rates: Array, width: int) -> NDArray[np.signedinteger[Any]]:
     """Indices of the states to keep: three quarters by promise, the rest evenly from what remains."""
     if rates.size <= width:
         return np.arange(rates.size)
@@ -213,7 +214,7 @@ def _finish(task: Task, layer: Array, rates: Array, k: int) -> tuple[int, int]:
 
 
 @compiled
-def search(task: Task, start: Array, lengths: Array, width: int, actions: Array) -> tuple[bool, bool]:
+def search(task: Task, start: Array, lengths: IntArray, width: int, actions: IntArray) -> tuple[bool, bool]:
     """Look for actions that keep farther than the limit from the others until their tracks end.
 
     Args:
@@ -257,7 +258,7 @@ def search(task: Task, start: Array, lengths: Array, width: int, actions: Array)
 
 
 @compiled
-def _trace(history: Array, layers: int, node: int, actions: Array) -> None:
+def _trace(history: IntArray, layers: int, node: int, actions: IntArray) -> None:
     """Write the actions that led to a state of a layer."""
     for n in range(layers - 1, -1, -1):
         actions[n] = history[n, node, 1]
@@ -265,7 +266,7 @@ def _trace(history: Array, layers: int, node: int, actions: Array) -> None:
 
 
 @compiled
-def commands_of(task: Task, start: Array, actions: Array, lengths: Array, commands: Array) -> None:
+def commands_of(task: Task, start: Array, actions: IntArray, lengths: IntArray, commands: Array) -> None:
     """Turn actions into the commands (K, 2) that make the autopilot do them."""
     s, k, rudders = start.copy(), 0, task.rudders
     for n in range(lengths.size):
