@@ -37,6 +37,8 @@ LANES = (
 )
 """Where each boat begins, and whereto it drives, and back again, m: every lane of ours crosses lanes of theirs."""
 SPEED_MPS, SEPARATION_M, START_S = 1.2, 2.5, 60.0
+APART_M = 0.25
+"""Two simulators tell places of up to 0.1 s apart: so much less than the true distance may be measured."""
 MISSION = """\
 ServerHost = localhost
 ServerPort = {port}
@@ -198,7 +200,7 @@ def fleet_text(boats: Boats) -> str:
     for i, name in enumerate(NAMES):
         link = f', link: {{kind: moos, address: "moos://127.0.0.1:{boats.ports[name]}"}}' if i < 3 else ""
         lines.append(f"  - {{name: {name}, agent: agent_{i}, platform: heron{link}}}")
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, "shield: {delay_s: 0.2, position_error_m: 0.3}"]) + "\n"
 
 
 def play(seconds: float = 180.0) -> dict[str, float]:
