@@ -51,7 +51,7 @@ def observation_keys(config: GameConfig) -> tuple[Key, ...]:
 
 
 def boat_slots(config: GameConfig) -> IntArray:
-    """Where boat i's observation holds boat j, (n, n): team-mates in order without itself, then opponents.
+    """Where boat i's observation holds boat j, (n, n): teammates in order without itself, then opponents.
 
     A boat's own slot is such that its status lies at the same offset as another boat's.
     """

@@ -117,7 +117,7 @@ class GameRecorder:
         sent: np.ndarray,
         reason: np.ndarray | None = None,
         intervened: np.ndarray | None = None,
-        certificate_m: np.ndarray | None = None,
+        safety_margin_m: np.ndarray | None = None,
     ) -> None:
         """Add one step.
 
@@ -127,7 +127,7 @@ class GameRecorder:
             sent: (n, 2) likewise, what the boats were told.
             reason: (n,) reason codes; all ``NOT_COVERED`` when left out.
             intervened: (n,) bool; all False when left out.
-            certificate_m: (n,) certificate values, m; all NaN when left out.
+            safety_margin_m: (n,) certificate values, m; all NaN when left out.
 
         Raises:
             TraceError: ``start`` was not called, or an array has the wrong shape.
@@ -140,7 +140,7 @@ class GameRecorder:
             "sent": sent,
             "reason": np.full(n, NOT_COVERED) if reason is None else reason,
             "intervened": np.zeros(n, bool) if intervened is None else intervened,
-            "certificate_m": np.full(n, np.nan) if certificate_m is None else certificate_m,
+            "safety_margin_m": np.full(n, np.nan) if safety_margin_m is None else safety_margin_m,
         }
         self._append(given | _state_of(view))
 

@@ -17,7 +17,7 @@ array              shape           contents
 ``sent``           (T, n, 2)       what the boat was told
 ``reason``         (T, n)          shield reason code; ``NOT_COVERED`` where no shield decided
 ``intervened``     (T, n)          bool, sent differs from wanted
-``certificate_m``  (T, n)          float32, NaN where there is none
+``safety_margin_m``  (T, n)          float32, NaN where there is none
 ``breaches``       (K, 4)          index of the first state inside, boat a, boat b, closest distance m
 =================  ==============  =======================================================================
 """
@@ -76,7 +76,7 @@ LAYOUT: dict[str, tuple[tuple[str | int, ...], Any]] = {
     "sent": (("T", "n", 2), np.float64),
     "reason": (("T", "n"), np.uint8),
     "intervened": (("T", "n"), np.bool_),
-    "certificate_m": (("T", "n"), np.float32),
+    "safety_margin_m": (("T", "n"), np.float32),
     "breaches": (("K", 4), np.float64),
 }
 """Per array: its axes (T steps, n boats, K breaches) and its type."""

@@ -147,7 +147,7 @@ def scene(boats: int, seed: int, platform: str = "heron", area_per_boat_m2: floa
     """Draw a fleet, half of it ours, as dense as six boats in an 80 x 40 m field, all wanting to go somewhere.
 
     Returns:
-        The fleet and its wanted commands.
+        The fleet and its nominal commands.
     """
     rng = np.random.default_rng([boats, seed])
     side_m = float(np.sqrt(boats * area_per_boat_m2))

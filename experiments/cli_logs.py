@@ -124,7 +124,7 @@ def sim_boats(
         Path | None, o.option("FILE", "Write what really happened (.npz) for render.", "--record"), NEW
     ] = None,
     check: Annotated[
-        bool, o.flag("Exit with status 1 after a breach of team-mates or an avoidable one.", "--check")
+        bool, o.flag("Exit with status 1 after a breach of teammates or an avoidable one.", "--check")
     ] = False,
     json_file: o.JsonFile = None,
 ) -> None:

@@ -142,7 +142,7 @@ def _plots(content: Mapping[str, Any], folder: Path, stem: str) -> list[Path]:
     radius_m = float((content["settings"].get("shield") or {}).get("separation_m", RADII_M[0]))
     metrics = [
         (breach_column("opponent", radius_m), f"hits with opponents per game, {radius_m:g} m"),
-        (breach_column("teammate", radius_m), f"hits with team-mates per game, {radius_m:g} m"),
+        (breach_column("teammate", radius_m), f"hits with teammates per game, {radius_m:g} m"),
         ("captures", "captures per game"),
     ]
     return [plots.png(plots.off_on(content["pairings"], metrics), folder / f"{stem}.png")]
@@ -228,14 +228,16 @@ def _reasons_line(reasons: Mapping[str, int]) -> str:
 
 
 PRICE_WORDS = (
-    "How long an opponent may do its worst before it holds its course (`adversary_s`) decides what safety costs. Hits "
-    "are entries into the distance kept, per game; differences are paired, shield on less off, same seeds; 95 % "
-    "intervals. `0` takes opponents to hold their course, `inf` to hunt for ever; the second of two is for those on "
-    "our side of the field (`visitor_s`), which can tag nobody there. Each row is of the version that measured it."
+    "How long an opponent may do its worst before it holds its course (`adversary_horizon_s`) decides what safety "
+    "costs. Hits are entries into the distance kept, per game; differences are paired, shield on less off, same "
+    "seeds; 95 % intervals. `0` takes opponents to hold their course, `inf` to hunt for ever; the second of two is for "
+    "those on our side of the field (`intruder_horizon_s`), which can tag nobody there. Each row is of the version "
+    "that measured it."
 )
 ADVICE = (
-    "What to set when: `players` (the default) against teams that play; `rammers` where nobody may be hit, where boats "
-    "often lie still, and on boats, as `FLEET.yaml` does; `hold-course` where opponents are traffic and not a team. "
+    "What to set when: `competitive` (the default) against teams that play; `ramming` where nobody may be hit, where "
+    "boats often lie still, and on boats, as `FLEET.yaml` does; `constant_velocity` where opponents are traffic and "
+    "not a team. "
     "Any two other settings are compared, paired, by `steerclear compare` ([settings](../settings.md))."
 )
 _PRICE_COLUMNS = (
@@ -250,9 +252,13 @@ def _horizon_of(content: Mapping[str, Any]) -> tuple[float, float] | None:
     shield = (content.get("settings") or {}).get("shield")
     if content.get("command") != "ablate" or not isinstance(shield, Mapping):
         return None
-    told = {k: math.inf if v == "inf" else v for k, v in shield.items() if k in ("adversary_s", "visitor_s", "profile")}
+    told = {
+        k: math.inf if v == "inf" else v
+        for k, v in shield.items()
+        if k in ("adversary_horizon_s", "intruder_horizon_s", "profile")
+    }
     config = ShieldConfig.of(**told)
-    return config.feared_s, config.visitor_feared_s
+    return config.effective_adversary_horizon_s, config.effective_intruder_horizon_s
 
 
 def price_page(found: Sequence[Mapping[str, Any]], folder: Path) -> Page:

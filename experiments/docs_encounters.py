@@ -186,7 +186,7 @@ def _intro(versions: Sequence[str]) -> str:
         "backup by the default shield's certificate. *Time to goal* is that without a guard times the number; own "
         "boats that *never arrived* had not reached their goal by the end of an encounter, though without a guard "
         "they do. *Left alone*: of states sampled along the encounters without a guard that are safe by the value "
-        "tables, how many wanted commands pass (both empty: results of an earlier version). The textbook filters are "
+        "tables, how many nominal commands pass (both empty: results of an earlier version). The textbook filters are "
         "those of `steerclear.experiments.baselines.textbook`, with gains chosen by their own sweep on these "
         "platforms; `reach` is `steerclear.experiments.baselines.reach`, the value tables alone; `gatekeeper` "
         "and `pl-cbf` are `steerclear.experiments.baselines.rollouts`, whose modules say what the papers leave open "

@@ -25,9 +25,9 @@ BREACH = {
     "kind": "teammate or opponent",
     "radius_m": "separation radius, m",
     "closest_m": "closest distance until they were apart again, m",
-    "verdict": "avoidable, unavoidable, started_inside or not_judged; of team-mates, whether either could",
+    "verdict": "avoidable, unavoidable, started_inside or not_judged; of teammates, whether either could",
     "last_preventable_s": "last moment at which own commands could still prevent it, s before; null when never",
-    "other_last_preventable_s": "the same of the opponent's boat; null for team-mates",
+    "other_last_preventable_s": "the same of the opponent's boat; null for teammates",
     "exhausted": "whether the search that found no later way kept every state it reached at its resolution",
     "responsible": "who let the later last moment pass: own, opponent, both, game (it drove the boat), neither, start",
     "responsible_boats[]": "those boats",
@@ -45,7 +45,7 @@ GAME_ROW = {
 _LIMITS = {"value": "figure", "low": "lower 95 % limit", "high": "upper 95 % limit"}
 _FIGURE = {**_LIMITS, "n": "number of games or pairs"}
 _VERDICTS = {
-    "breaches": "breaches of team-mates or with opponents at the shield's radius, judged games",
+    "breaches": "breaches of teammates or with opponents at the shield's radius, judged games",
     "avoidable": "of those avoidable",
     "unavoidable": "of those unavoidable",
     "started_inside": "of those between boats that started inside",
@@ -299,7 +299,7 @@ _SIM_BOATS = {
     "breaches[].unsteered_s[]": "for how long nobody had steered each of the two boats, s; 0: somebody did",
     "breaches[].faults[]": "faults of simulated boats that acted on one of the two then or in the 5 s before",
     "breaches[].after_run": "whether the boats of the breach had been left in HOLD and nobody steered any from then on",
-    "clean": "whether the run had neither a breach of team-mates nor an avoidable one; false when not recorded",
+    "clean": "whether the run had neither a breach of teammates nor an avoidable one; false when not recorded",
     "files[]": "what was written",
 }
 """Beside these: ``breaches`` of the team the file names, as other commands give them, when recorded."""

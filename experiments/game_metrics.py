@@ -111,7 +111,7 @@ def team_pairs(team: ArrayLike, side: int, kind: str) -> NDArray[np.bool_]:
 STILL_MPS = 0.2
 """A boat slower than this stands still; one that is asked for more wants to move."""
 DEADLOCK_S = 10.0
-"""Two team-mates that stand still for longer than this, both wanting to move, are deadlocked."""
+"""Two teammates that stand still for longer than this, both wanting to move, are deadlocked."""
 
 
 @kernel
@@ -258,7 +258,7 @@ def tally(record: Record, side: int, radii_m: Sequence[float] = RADII_M) -> dict
 def scored_collisions(distances: PairDistances, meta: Mapping[str, Any], side: int) -> int:
     """Count collisions as the game does: per entry into the sum of the agent radii, for each boat of the team.
 
-    Two team-mates that collide thus count twice.
+    Two teammates that collide thus count twice.
     """
     own_radius_m = np.broadcast_to(np.asarray(meta["agent_radius_m"], dtype=np.float64), len(meta["team"]))
     total = 0

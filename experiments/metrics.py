@@ -181,7 +181,7 @@ REASONS = {
     "escape": "the same, as results of 0.2.0 and before name it",
     "best_effort": "no manoeuvre keeps the radius: the one that keeps most of it",
     "held": "the policy asked for nothing usable (no number, or absurdly large): the boat is told to stop on course",
-    "right_of_way": "two team-mates kept each other from turning: one gives way, one stands on",
+    "right_of_way": "two teammates kept each other from turning: one gives way, one stands on",
     "limited": "the wanted speed is beyond what the boat does: cut to that, and so it is safe",
     "stopped": "beyond the hard line, or about to touch an obstacle: the boat is told to stop, as the settings say",
 }
@@ -342,7 +342,7 @@ def game_goals(separation_m: float) -> list[Goal]:
     beside = {kind: _driven_words(kind, separation_m) for kind in ("teammate", "opponent")}
     at = f"at {separation_m:g} m, of boats the team commands"
     return [
-        Goal(f"hits with team-mates {at}, shielded, all games", _paired(mates), "<=", 0.0, beside["teammate"]),
+        Goal(f"hits with teammates {at}, shielded, all games", _paired(mates), "<=", 0.0, beside["teammate"]),
         Goal(f"hits with opponents {at}, on / off", _paired(opponents), "<=", 0.1, beside["opponent"]),
         Goal("captures, on / off", on_over_off("captures"), ">=", 0.9),
         Goal("deadlocks, shielded, per game", rate("deadlocks"), "<=", 0.0),

@@ -139,7 +139,7 @@ def _add_commands(packer: Packer, record: Record) -> None:
     packer.add_numbers("sent_speed", sent[..., 0].T, "wanted_speed", limits)
     packer.add_angles("wanted_heading", wanted[..., 1].T, "previous")
     packer.add_angles("sent_heading", sent[..., 1].T, "wanted_heading")
-    packer.add_numbers("certificate", record["certificate_m"].T.astype(np.float64), "previous")
+    packer.add_numbers("certificate", record["safety_margin_m"].T.astype(np.float64), "previous")
     packer.add_codes("reason", record["reason"].T.astype(np.uint8), None)
     packer.add_codes("intervened", record["intervened"].T.astype(np.uint8), None)
 

@@ -250,7 +250,7 @@ def _tiles(pairings: Sequence[Summary], separation_m: float) -> list[Tile]:
     hits = f"centres within {separation_m:g} m, per game"
     chosen = [
         ("hits with opponents", breach_column("opponent", separation_m), hits),
-        ("hits with team-mates", breach_column("teammate", separation_m), hits),
+        ("hits with teammates", breach_column("teammate", separation_m), hits),
         ("captures", "captures", "per game"),
         ("closest distance", "closest_m", "m, mean of the games"),
         ("steps changed", "changed_share", "% of the commands decided"),
@@ -276,7 +276,7 @@ def _plots(results: Mapping[str, Any], separation_m: float) -> list[Plot]:
     mates, opponents = (breach_column(kind, separation_m) for kind in ("teammate", "opponent"))
     return [
         _bars("Hits with opponents", pairings, opponents, hits.format("opponents")),
-        _bars("Hits with team-mates", pairings, mates, hits.format("team-mates")),
+        _bars("Hits with teammates", pairings, mates, hits.format("teammates")),
         _bars("Captures", pairings, "captures", "captures per game"),
         _closest(results["games"], separation_m),
         _bars("Steps changed", pairings, "changed_share", "steps changed, %", CHANGED_SHARE_GOAL),

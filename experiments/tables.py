@@ -26,7 +26,7 @@ COVERED_WORDS = (
     "Shield on leaves boats that the game drives (tagged, out of bounds) to it, as a real game and a wrapped zip do; "
     "covered decides for them too. Goals are of shield on."
 )
-_KINDS = (("teammate", "team-mate"), ("opponent", "opponent"))
+_KINDS = (("teammate", "teammate"), ("opponent", "opponent"))
 _COVERED_SHOWN = ("captures", "net_captures", "clean_games", "changed_share")
 """Figures of the small table of covered games, beside hits; report and results have all."""
 _VERDICTS = {True: Text("met", "green"), False: Text("not met", "red"), None: Text("no data", "yellow")}

@@ -14,7 +14,7 @@ _SIDE = {
     "hits_teammate": "entries of two boats of the side into the separation radius",
     "hits_opponent": "entries of a boat of the side and an opponent into it",
     "closest_m": "closest distance of a boat of the side to any other, m",
-    "avoidable_teammate": "hits of team-mates that own commands could have avoided; null when not judged",
+    "avoidable_teammate": "hits of teammates that own commands could have avoided; null when not judged",
     "avoidable_opponent": "the same with opponents",
     "changed_share": "share of its boat-steps whose command the shield changed, 0 to 1; null without a shield",
     "deadlocks": "pairs of its boats that want to move and stood still for over 10 s",

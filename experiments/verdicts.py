@@ -176,7 +176,7 @@ AVOIDABLE = Outcome.AVOIDABLE.value
 
 
 Row = Mapping[str, Any]
-KINDS = (("teammate", "team-mate"), ("opponent", "opponent"))
+KINDS = (("teammate", "teammate"), ("opponent", "opponent"))
 SIDES = ("own", "opponent", "both", "game", "neither", "start")
 OFF, ON, COVERED = STATES = ("off", "on", "covered")
 """States of the shield; covered, where it is played beside on: also for boats that the game drives."""

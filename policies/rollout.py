@@ -33,7 +33,7 @@ CAPTURES, GRABS, TAGS, MATE_HITS_BLUE, MATE_HITS_RED, FOE_HITS, NEAR_BLUE, NEAR_
 OUT_BLUE, OUT_RED = 8, 9
 N_COUNTED = 10
 NEAR_MATES_M = 6.0
-"""Closer than this, team-mates are counted as near, decision by decision."""
+"""Closer than this, teammates are counted as near, decision by decision."""
 SLACK_M = 0.001
 """Pairs this much farther apart than what is looked for are not measured to the last bit."""
 
@@ -41,7 +41,7 @@ SLACK_M = 0.001
 class Weights(NamedTuple):
     """What a plan is worth, to one team; distances count per field width.
 
-    The paper's team played for captures, progress and contacts of team-mates; its row has the fewest collisions.
+    The paper's team played for captures, progress and contacts of teammates; its row has the fewest collisions.
     """
 
     capture: float = 10.0
@@ -234,7 +234,7 @@ def _count_events(events: IntArray, early: float, counted: Array) -> None:
 
 @lean_kernel
 def _count_pairs(rules: Rules, state: Array, touching: BoolArray, counted: Array) -> None:
-    """Count contacts that are new and team-mates that are near; ``touching`` (n, n) is brought up to date."""
+    """Count contacts that are new and teammates that are near; ``touching`` (n, n) is brought up to date."""
     for i in range(rules.n_boats):
         for j in range(i + 1, rules.n_boats):
             mates = rules.team[i] == rules.team[j]

@@ -77,13 +77,13 @@ class BatchedShield:
         self.serves: int | None = None
 
     @property
-    def certificate_m(self) -> Array:
+    def safety_margin_m(self) -> Array:
         """(B, n) margins of the last decisions, m."""
         return self._deciders.scene.told[:, :, W.MARGIN_M]
 
     @property
     def cut_short(self) -> BoolArray:
-        """(B,) which of the last decisions were ended by `ShieldConfig.search_limit`."""
+        """(B,) which of the last decisions were ended by `ShieldConfig.work_budget`."""
         return np.asarray((self._deciders.scene.told[:, :, W.CUT_SHORT] != 0.0).any(axis=1))
 
     @property
@@ -122,8 +122,8 @@ class BatchedShield:
 
         Returns:
             (B, n, 2) commands; rows of boats not decided for, and of those that pass, bit for bit as wanted. The
-            array is reused by the next call. ``reason`` and ``certificate_m`` (B, n) tell why, ``cut_short`` (B,)
-            which decisions were ended by `ShieldConfig.search_limit`.
+            array is reused by the next call. ``reason`` and ``safety_margin_m`` (B, n) tell why, ``cut_short`` (B,)
+            which decisions were ended by `ShieldConfig.work_budget`.
 
         Raises:
             FleetError: an array has the wrong shape or holds no numbers, or a state is not finite.

@@ -48,10 +48,10 @@ def _note_fears(given: Array, scene: Scene) -> None:
     """Note how long each boat counts as adversarial: what is given, or where that is NaN the settings."""
     tuning = scene.tuning
     for i in range(given.shape[0]):
-        time_s = tuning.visitor_s if given[i, W.VISITING] != 0.0 else tuning.feared_s
+        time_s = tuning.intruder_horizon_s if given[i, W.VISITING] != 0.0 else tuning.adversary_horizon_s
         if not math.isnan(given[i, W.HORIZON_S]):
             time_s = given[i, W.HORIZON_S]
-        scene.fear_s[i] = time_s if tuning.feared_s > 0.0 else 0.0
+        scene.fear_s[i] = time_s if tuning.adversary_horizon_s > 0.0 else 0.0
 
 
 @lean_kernel
@@ -147,7 +147,9 @@ def _note_backing_up(i: int, scene: Scene) -> None:
     backing_up = reason in (W.BACKUP, W.BEST_EFFORT)
     left_s = 0.0
     if backing_up:
-        left_s = (memory[W.HOLD_S] if memory[W.BACKING_UP] > 0.0 else scene.boats.dwell_s[i]) - scene.tuning.dt_s
+        left_s = (
+            memory[W.HOLD_S] if memory[W.BACKING_UP] > 0.0 else scene.boats.min_backup_hold_s[i]
+        ) - scene.tuning.dt_s
     memory[W.HOLD_S] = left_s if left_s > ROUNDING_S else 0.0
     memory[W.BACKING_UP] = 1.0 if backing_up else 0.0
 
@@ -182,7 +184,7 @@ def commit(scene: Scene) -> None:
 
 @lean_kernel
 def _note_causes(scene: Scene) -> None:
-    """Note what each boat's nominal command is short of: of an opponent also where a team-mate is nearer."""
+    """Note what each boat's nominal command is short of: of an opponent also where a teammate is nearer."""
     for i in range(scene.ours.shape[0]):
         short = scene.ours[i] and scene.kept[i] < ALL
         scene.cause[i] = scene.bound[i] if short else -1

@@ -19,13 +19,14 @@ from .commands import Commands
 from .exceptions import FleetError
 from .fleet import FIELD, Fleet
 from .jit import Array, BoolArray, IntArray
+from .renamed import DECISION, DECISIONS, accepts_old_names
 
 
 class Reason(IntEnum):
     """Why a command is what it is."""
 
     PASSED = workspace.PASSED
-    """The wanted command leaves every boat its backup; it is sent bit for bit."""
+    """The nominal command leaves every boat its backup; it is sent bit for bit."""
     LEAST_CHANGE = workspace.LEAST_CHANGE
     """The command nearest to the nominal one that keeps what the backups keep, found by what `Decision.solver` names
     and re-checked with the full boat model."""
@@ -41,12 +42,12 @@ class Reason(IntEnum):
     BEST_EFFORT = workspace.BEST_EFFORT
     """No manoeuvre keeps the margin; the one that keeps most of it."""
     HELD = workspace.HELD
-    """The wanted command was not finite or absurdly large, or a registered barrier tells nothing where the boat is: the
-    boat is told to stop on its course."""
+    """The nominal command was not finite or absurdly large, or a registered barrier tells nothing where the boat is:
+    the boat is told to stop on its course."""
     NOT_COVERED = workspace.NOT_COVERED
     """The shield does not decide for this boat."""
     RIGHT_OF_WAY = workspace.RIGHT_OF_WAY
-    """Two team-mates kept each other from turning: one turns away (gives way), one holds its course (stands on)."""
+    """Two teammates kept each other from turning: one turns away (gives way), one holds its course (stands on)."""
     LIMITED = workspace.LIMITED
     """The wanted speed is beyond what the platform does: it is cut to that, and so it leaves every boat its backup."""
     STOPPED = workspace.STOPPED
@@ -56,7 +57,7 @@ class Reason(IntEnum):
 
 SOLVERS = (None, "qp", "line_search")
 """What finds a least change, by its number in `Decisions.solver`: the quadratic program on linearised constraints,
-among team-mates; a line search between nominal command and backup, where constraints are curved."""
+among teammates; a line search between nominal command and backup, where constraints are curved."""
 
 FALLBACKS = {
     Reason.BACKUP: "backup manoeuvre",
@@ -66,6 +67,7 @@ FALLBACKS = {
 }
 
 
+@accepts_old_names(DECISION)
 @dataclass(frozen=True, eq=False)
 class Decision:
     """One boat's decision.
@@ -74,41 +76,41 @@ class Decision:
 
     Attributes:
         boat: name of the boat.
-        wanted_heading_rad, wanted_speed_mps: wanted command, heading absolute, clockwise from north.
-        sent_heading_rad, sent_speed_mps: command to send.
+        nominal_heading_rad, nominal_speed_mps: nominal command, heading absolute, clockwise from north.
+        filtered_heading_rad, filtered_speed_mps: command to send.
         intervened: whether the two differ in any bit.
         reason: why.
-        binding: names of the boats, or registered barriers, or "field", that bind.
-        certificate_m: verified margin beyond the separation, m; inf when nobody is near.
+        active_constraints: names of the boats, or registered barriers, or "field", that the command was chosen for.
+        safety_margin_m: verified margin beyond the separation, m; inf when nobody is near.
         slack_m: margin given up, m.
         fallback: name of the fallback used, or None.
         solve_time_s: time of the whole decision, s.
         no_table: names of the opponents that a value table should answer for and none does: they are run through as
             pursuers instead, which for slow boats is the poorer word; the log says why, once. None: not known, as of
             decisions read from a black box.
-        cut_short: whether the search for this boat's command was ended by `ShieldConfig.search_limit`: what is sent is
+        cut_short: whether the search for this boat's command was ended by `ShieldConfig.work_budget`: what is sent is
             the best that was verified until then.
         solver: what found a `LEAST_CHANGE`, "qp" or "line_search"; None: of another reason, or not known.
         outside_m: how far outside the field's edge the boat is, m; 0 inside, or where there is no field.
-        feared_s: how long from now this boat, an opponent, was taken to do its worst before it holds its course, s
-            (0: it holds it from now on, or its way is known). None: it is no opponent, or not known.
+        adversary_horizon_s: how long from now this boat, an opponent, was taken to do its worst before it holds its
+            course, s (0: it holds it from now on, or its way is known). None: it is no opponent, or not known.
     """
 
     boat: str
-    wanted_heading_rad: float
-    wanted_speed_mps: float
-    sent_heading_rad: float
-    sent_speed_mps: float
+    nominal_heading_rad: float
+    nominal_speed_mps: float
+    filtered_heading_rad: float
+    filtered_speed_mps: float
     intervened: bool
     reason: Reason
-    binding: tuple[str, ...]
-    certificate_m: float
+    active_constraints: tuple[str, ...]
+    safety_margin_m: float
     slack_m: float
     fallback: str | None
     solve_time_s: float = field(compare=False)
     no_table: tuple[str, ...] | None = None
     cut_short: bool = False
-    feared_s: float | None = None
+    adversary_horizon_s: float | None = None
     outside_m: float = 0.0
     solver: str | None = None
 
@@ -124,25 +126,27 @@ class Decision:
         return tuple(None if value != value else value for value in values)
 
 
+@accepts_old_names(DECISIONS)
 @dataclass(frozen=True)
 class Decisions(Sequence[Decision]):
     """Decisions for all boats of a fleet, in its order; indexing, by place or name, builds the `Decision` of one boat.
 
     ``decisions[0]`` is that of the fleet's first boat, ``decisions["boat_0"]`` that of the boat of this name, and
-    ``"boat_0" in decisions`` tells whether there is one. `sent` and the other arrays have all boats at once.
+    ``"boat_0" in decisions`` tells whether there is one. `filtered` and the other arrays have all boats at once.
 
     Attributes:
         fleet: the fleet decided on.
-        wanted, sent: commands, in the same frame.
+        nominal, filtered: commands, in the same frame.
         intervened: (n,) bool.
         reason: (n,) values of `Reason`.
-        certificate_m: (n,) margins, m.
+        safety_margin_m: (n,) margins, m.
         slack_m: (n,) m.
         bound: (n,) index of the binding neighbour, -1 none, -2 static constraints, -3 and below ``barriers``.
         solve_time_s: time of the whole decision, s.
         no_table: (n, n) pairs of own boat and opponent whose value table is missing, see `Decision`; None: not known.
-        cut_short: (n,) boats whose search was ended by `ShieldConfig.search_limit`; None: not known, taken for none.
-        feared_s: (n,) how long each boat is feared as an opponent, s, NaN for those that are none; None: not known.
+        cut_short: (n,) boats whose search was ended by `ShieldConfig.work_budget`; None: not known, taken for none.
+        adversary_horizon_s: (n,) how long each boat, an opponent, may do its worst, s, NaN for those that are none;
+            None: not known.
         solver: (n,) what found each least change, places in `SOLVERS`; None: not known.
         barriers: names of the registered barriers that are kept.
         area: (xmin, ymin, xmax, ymax) of the field decided in, m; None: there is none.
@@ -153,17 +157,17 @@ class Decisions(Sequence[Decision]):
     """
 
     fleet: Fleet
-    wanted: Commands
-    sent: Commands
+    nominal: Commands
+    filtered: Commands
     intervened: BoolArray
     reason: IntArray
-    certificate_m: Array
+    safety_margin_m: Array
     slack_m: Array
     bound: IntArray
     solve_time_s: float = field(compare=False)
     no_table: BoolArray | None = None
     cut_short: BoolArray | None = None
-    feared_s: Array | None = None
+    adversary_horizon_s: Array | None = None
     solver: IntArray | None = None
     barriers: tuple[str, ...] = ()
     area: tuple[float, float, float, float] | None = None
@@ -203,31 +207,31 @@ class Decisions(Sequence[Decision]):
 
     def _decision(self, i: int) -> Decision:
         heading = self.fleet.heading_rad[i]
-        wanted_speed, wanted_heading = self.wanted.absolute(i, heading)
-        sent_speed, sent_heading = self.sent.absolute(i, heading)
+        wanted_speed, wanted_heading = self.nominal.absolute(i, heading)
+        sent_speed, sent_heading = self.filtered.absolute(i, heading)
         reason = Reason(int(self.reason[i]))
-        margin = float(self.certificate_m[i])
+        margin = float(self.safety_margin_m[i])
         return Decision(
             boat=self.fleet.names[i],
-            wanted_heading_rad=wanted_heading,
-            wanted_speed_mps=wanted_speed,
-            sent_heading_rad=sent_heading,
-            sent_speed_mps=sent_speed,
+            nominal_heading_rad=wanted_heading,
+            nominal_speed_mps=wanted_speed,
+            filtered_heading_rad=sent_heading,
+            filtered_speed_mps=sent_speed,
             intervened=bool(self.intervened[i]),
             reason=reason,
-            binding=self._binding(int(self.bound[i])),
-            certificate_m=margin if margin < 1e5 else math.inf,
+            active_constraints=self._active(int(self.bound[i])),
+            safety_margin_m=margin if margin < 1e5 else math.inf,
             slack_m=float(self.slack_m[i]),
             fallback=FALLBACKS.get(reason),
             solve_time_s=self.solve_time_s,
             no_table=self._no_table(i),
             cut_short=self.cut_short is not None and bool(self.cut_short[i]),
-            feared_s=self._feared_s(i),
+            adversary_horizon_s=self._feared_s(i),
             outside_m=float(self.outside_m[i]),
             solver=None if self.solver is None else SOLVERS[int(self.solver[i])],
         )
 
-    def _binding(self, bound: int) -> tuple[str, ...]:
+    def _active(self, bound: int) -> tuple[str, ...]:
         if bound == STATIC:
             return (FIELD,)
         if bound < STATIC:
@@ -235,9 +239,9 @@ class Decisions(Sequence[Decision]):
         return (self.fleet.names[bound],) if bound >= 0 else ()
 
     def _feared_s(self, i: int) -> float | None:
-        if self.feared_s is None or math.isnan(self.feared_s[i]):
+        if self.adversary_horizon_s is None or math.isnan(self.adversary_horizon_s[i]):
             return None
-        return float(self.feared_s[i])
+        return float(self.adversary_horizon_s[i])
 
     def _no_table(self, i: int) -> tuple[str, ...] | None:
         if self.no_table is None:
@@ -247,8 +251,8 @@ class Decisions(Sequence[Decision]):
         return tuple(self.fleet.names[j] for j in np.flatnonzero(self.no_table[i]))
 
     def __str__(self) -> str:
-        """One line a boat: what was wanted, what is sent, and why."""
-        heads = ("boat", "wanted deg", "m/s", "sent deg", "m/s", "reason", "binding", "margin m")
+        """One line a boat: the nominal command, the filtered one, and why."""
+        heads = ("boat", "nominal deg", "m/s", "filtered deg", "m/s", "reason", "active constraint", "margin m")
         rows = [heads, *(_cells(one) for one in self)]
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         left = (0, 5, 6)  # words; numbers stand to the right
@@ -277,12 +281,12 @@ def _cells(one: Decision) -> tuple[str, ...]:
     wanted, sent = (
         (f"{math.degrees(heading) % 360.0:.1f}", f"{speed:.2f}")
         for heading, speed in (
-            (one.wanted_heading_rad, one.wanted_speed_mps),
-            (one.sent_heading_rad, one.sent_speed_mps),
+            (one.nominal_heading_rad, one.nominal_speed_mps),
+            (one.filtered_heading_rad, one.filtered_speed_mps),
         )
     )
-    margin = "-" if math.isinf(one.certificate_m) else f"{one.certificate_m:.2f}"
-    return (one.boat, *wanted, *sent, one.reason.name, ", ".join(one.binding) or "-", margin)
+    margin = "-" if math.isinf(one.safety_margin_m) else f"{one.safety_margin_m:.2f}"
+    return (one.boat, *wanted, *sent, one.reason.name, ", ".join(one.active_constraints) or "-", margin)
 
 
 def _place(index: Any) -> int:
@@ -296,5 +300,5 @@ def _place(index: Any) -> int:
             return operator.index(index)
     raise FleetError(
         f"decisions are indexed by a boat's name or place in the fleet, not by {index!r}; of several boats at once "
-        "see their arrays: sent.values, intervened, reason"
+        "see their arrays: filtered.values, intervened, reason"
     )

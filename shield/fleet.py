@@ -16,6 +16,7 @@ from .jit import Array, BoolArray, IntArray, kernel
 from .platforms import Platform, get_platform
 from .platforms import layout as L
 from .platforms.files import is_path
+from .renamed import FLEET, accepts_old_names
 
 _SEEN = (L.X, L.Y, L.HEADING, L.SPEED)
 
@@ -49,6 +50,7 @@ def sound(state: Array) -> bool:
     return True
 
 
+@accepts_old_names(FLEET)
 @dataclass(frozen=True)
 class Fleet:
     """State of n boats, own and others.
@@ -69,10 +71,12 @@ class Fleet:
             m/s, the place x, y m it steers at (NaN: none, the rudder is left alone) and the time, s, for which that is
             sure to last; a row of NaN where nothing is known. None: of no boat. They are foreseen as such, see
             `barriers.neighbours`, unless they may be free before a backup ends, or are controlled.
-        adversary_s: (n,) how long from now each may do its worst as an opponent before it holds its course, s; NaN, or
-            None for all: as the settings say, see `ShieldConfig.adversary_s`; where that is 0 nobody is feared at all.
+        adversary_horizon_s: (n,) how long from now each may do its worst as an opponent before it holds its course, s;
+            NaN, or
+            None for all: as the settings say, see `ShieldConfig.adversary_horizon_s`; where that is 0 nobody is feared
+            at all.
         visiting: (n,) boats on the other team's side of a field, where they can tag nobody: they are feared for
-            `ShieldConfig.visitor_s`. None: of none it is known.
+            `ShieldConfig.intruder_horizon_s`. None: of none it is known.
     """
 
     state: Array
@@ -83,7 +87,7 @@ class Fleet:
     age_s: Array | None = None
     position_error_m: Array | None = None
     driven: Array | None = None
-    adversary_s: Array | None = None
+    adversary_horizon_s: Array | None = None
     visiting: BoolArray | None = None
 
     def __post_init__(self) -> None:
@@ -116,7 +120,7 @@ class Fleet:
         heading_error_rad: ArrayLike | None = None,
         age_s: ArrayLike | None = None,
         position_error_m: ArrayLike | None = None,
-        adversary_s: ArrayLike | None = None,
+        adversary_horizon_s: ArrayLike | None = None,
         visiting: ArrayLike | None = None,
     ) -> Fleet:
         """Fleet from plain arrays.
@@ -135,7 +139,8 @@ class Fleet:
             heading_error_rad: (n,) last error the heading controller saw where known, else NaN.
             age_s: (n,) age of each track, s, 0 to 3600; more than `ShieldConfig.max_track_age_s` is refused later.
             position_error_m: (n,) bound on the position error, m, 0 to 1000.
-            adversary_s: (n,) how long each may do its worst as an opponent, s, 0 to inf; NaN: as the settings say.
+            adversary_horizon_s: (n,) how long each may do its worst as an opponent, s, 0 to inf; NaN: as the settings
+            say.
             visiting: (n,) bool, boats on the other team's side, where they can tag nobody.
 
         Raises:
@@ -158,7 +163,12 @@ class Fleet:
             state[:, L.HEADING] = (_headings_deg(heading_rad, heading_deg, n) + 180.0) % 360.0 - 180.0
         hint_at_positions(position)
         teams = _rows("team", team, (n,), whole_numbers).copy()
-        given = {"age_s": age_s, "position_error_m": position_error_m, "adversary_s": adversary_s, "visiting": visiting}
+        given = {
+            "age_s": age_s,
+            "position_error_m": position_error_m,
+            "adversary_horizon_s": adversary_horizon_s,
+            "visiting": visiting,
+        }
         fleet = cls(
             state=state,
             team=teams,
@@ -189,10 +199,10 @@ class Fleet:
         if self.position_error_m is not None:
             remedy = "give a bound in m per boat, 0 to {:g}"
             _check_range(self, "position_error_m", self.position_error_m, 0.0, LARGEST, remedy)
-        if self.adversary_s is not None:
-            times_s = np.where(np.isnan(self.adversary_s), 0.0, self.adversary_s)
+        if self.adversary_horizon_s is not None:
+            times_s = np.where(np.isnan(self.adversary_horizon_s), 0.0, self.adversary_horizon_s)
             remedy = "give s per boat, 0 to {:g}, or NaN where the settings say it"
-            _check_range(self, "adversary_s", times_s, 0.0, np.inf, remedy)
+            _check_range(self, "adversary_horizon_s", times_s, 0.0, np.inf, remedy)
 
     def _name_fault(self) -> None:
         """Raise for the first boat whose values cannot be used."""
@@ -237,11 +247,11 @@ _ARRAYS: dict[str, tuple[Callable[[Any], Any], tuple[int, ...]]] = {
     "age_s": (numbers, ()),
     "position_error_m": (numbers, ()),
     "driven": (numbers, (4,)),
-    "adversary_s": (numbers, ()),
+    "adversary_horizon_s": (numbers, ()),
     "visiting": (truths, ()),
 }
 """What brings each array to the type of compiled code, and the shape of a boat's row in it."""
-_OPTIONAL = ("age_s", "position_error_m", "driven", "adversary_s", "visiting")
+_OPTIONAL = ("age_s", "position_error_m", "driven", "adversary_horizon_s", "visiting")
 
 
 def _rows(name: str, value: Any, shape: tuple[int | None, ...], brought: Callable[[Any], Any] = numbers) -> Any:

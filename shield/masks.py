@@ -1,10 +1,10 @@
 """Masks of actions: which candidate commands a shield would let pass as they are, in this step.
 
 A candidate of a boat passes where the boat, one step after it, still satisfies everything on its backup, while its
-team-mates go straight on. It is the nominal check of that boat alone: neighbours, required margins and the backup are
+teammates go straight on. It is the nominal check of that boat alone: neighbours, required margins and the backup are
 found once for all candidates, and candidates that lead to the same state are checked once.
 
-A mask says what passes now; it says nothing of later steps, nor of team-mates' candidates. The shield stays behind it,
+A mask says what passes now; it says nothing of later steps, nor of teammates' candidates. The shield stays behind it,
 and is what keeps boats apart.
 """
 
@@ -112,7 +112,7 @@ def _passing(i: int, b: int, candidates: Array, states: Array, passes: BoolArray
             alike += 1
         copy_row(states[k], scene.next_state[i])
         passes[k] = passes[alike] if alike < k else _has_backup(i, scene)
-    if scene.searched[i] > 0:  # team-mates are rated beside it as it goes on
+    if scene.searched[i] > 0:  # teammates are rated beside it as it goes on
         scene.command[i, 0], scene.command[i, 1] = scene.state[i, L.SPEED], 0.0
         predict(i, scene.command, scene)
         togo_deg = found_turn(i, scene.next_state[i, L.HEADING], scene.held)

@@ -56,29 +56,29 @@ def tuning_of(config: ShieldConfig) -> Tuning:
             moves=config.moves,
             radius_m=config.separation_m + config.buffer_m,
             buffer_m=config.buffer_m,
-            tail_s=config.tail_s,
+            straight_horizon_s=config.straight_horizon_s,
             margin_cap_m=config.margin_cap_m,
             speed_weight=config.speed_weight,
-            mate_cap_m=config.mate_cap_m if _mates_are_known(config) else config.margin_cap_m,
-            static_decay=_decay(config.fixed_response_per_s, config),
-            give_way_after_s=config.give_way_after_s,
-            feared_s=config.feared_s,
-            visitor_s=config.visitor_feared_s,
+            teammate_margin_cap_m=config.teammate_margin_cap_m if _mates_are_known(config) else config.margin_cap_m,
+            static_decay=_decay(config.static_cbf_rate_per_s, config),
+            deadlock_timeout_s=config.deadlock_timeout_s,
+            adversary_horizon_s=config.effective_adversary_horizon_s,
+            intruder_horizon_s=config.effective_intruder_horizon_s,
             position_error_m=config.position_error_m,
             delay_s=config.delay_s,
             track_error_mps=config.track_error_mps,
-            search_limit=config.search_limit,
+            work_budget=config.work_budget,
         )
     )
 
 
 def _mates_are_known(config: ShieldConfig) -> bool:
-    """Whether what team-mates will do is known: one program decides for all, and sees and steers them as they are.
+    """Whether what teammates will do is known: one program decides for all, and sees and steers them as they are.
 
     Nor may it be where nothing is feared of opponents but that they hold their course: their margin is one with it.
     """
     exact = config.position_error_m == 0.0 and config.delay_s == 0.0 and config.current_mps == 0.0
-    return config.coordination == "team" and exact and config.feared_s > 0.0
+    return config.coordination == "team" and exact and config.effective_adversary_horizon_s > 0.0
 
 
 @lru_cache(maxsize=256)
@@ -90,8 +90,8 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
     """
     kinds = tuple(get_platform(name) for name in platforms)
     limits = [limits_of(kind, config.model_s) for kind in kinds]
-    certificate = CERTIFICATES[config.certificate]
-    granted = 1.0 if config.feared_s > 0.0 else 0.0
+    certificate = CERTIFICATES[config.opponent_model]
+    granted = 1.0 if config.effective_adversary_horizon_s > 0.0 else 0.0
     strides = [_stride(kind, limit, config.model_s) for kind, limit in zip(kinds, limits, strict=True)]
     stride = max(1, min(strides, default=1))
     lookup = _tables_of(config, kinds, team) if granted == 1.0 else _no_tables(len(kinds))
@@ -114,15 +114,15 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
             sample_s=stride * config.model_s,
             **_plans(certificate, kinds, with_table),
             decay=np.where(
-                with_table, _decay(config.table_response_per_s, config), _decay(config.response_per_s, config)
+                with_table, _decay(config.table_cbf_rate_per_s, config), _decay(config.cbf_rate_per_s, config)
             ),
             cap_m=np.where(with_table, _table_cap(config, lookup), config.margin_cap_m),
-            dwell_s=np.array([config.dwell_s if kind.kind == "rate" else 0.0 for kind in kinds]),
+            min_backup_hold_s=np.array([config.min_backup_hold_s if kind.kind == "rate" else 0.0 for kind in kinds]),
             tables=lookup.tables,
             table=lookup.table,
             table_margin_m=config.table_margin_m,
             table_steps=np.where(with_table, lookup.steps, 0),
-            joint_decay=_decay(config.response_per_s, config),
+            joint_decay=_decay(config.cbf_rate_per_s, config),
             joint_samples=math.ceil(max(lookup.steps, round(JOINT_RUN_S / config.model_s)) / stride),
             feared=np.asarray((lookup.table >= 0).any(axis=0)),
             **_horizons(config, kinds, limits, team, stride * config.model_s, granted > 0.0),
@@ -134,7 +134,7 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
 def missing_tables(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: tuple[int, ...]) -> BoolArray:
     """Pairs (own boat, opponent), (n, n), that a value table should answer for and none does; the log says why."""
     sides = np.array(team)
-    wanted = config.feared_s > 0.0
+    wanted = config.effective_adversary_horizon_s > 0.0
     limits = [limits_of(get_platform(name), config.model_s) for name in platforms]
     kinds = [get_platform(name) for name in platforms]
     uses = np.array(
@@ -155,7 +155,7 @@ def _horizons(
     pursuers: bool,
 ) -> dict[str, Any]:
     """How many samples each boat's paths, pursuers and static constraints are followed for."""
-    certificate = CERTIFICATES[config.certificate]
+    certificate = CERTIFICATES[config.opponent_model]
     horizon_s = [config.horizon_s or certificate.horizon_s(kind, config.model_s) for kind in kinds]
     pursuit_s, static_s, thrust_s = list(horizon_s), [], []
     for i, limit in enumerate(limits):
@@ -232,7 +232,7 @@ def _tables_of(config: ShieldConfig, kinds: tuple[Platform, ...], team: tuple[in
 
 def _uses_table(config: ShieldConfig, kind: Platform, limit: Limits) -> bool:
     """Whether a boat looks opponents up where there is a table; there is none for boats that turn by a rate loop."""
-    return kind.kind != "rate" and CERTIFICATES[config.certificate].uses_table(limit)
+    return kind.kind != "rate" and CERTIFICATES[config.opponent_model].uses_table(limit)
 
 
 @lru_cache(maxsize=64)
@@ -254,9 +254,9 @@ def _plans(certificate: Certificate, kinds: tuple[Platform, ...], with_table: Bo
     return {"plans": plans, "n_plans": np.array([len(family) for family in families], dtype=np.int64)}
 
 
-def _decay(response_per_s: float, config: ShieldConfig) -> float:
+def _decay(cbf_rate_per_s: float, config: ShieldConfig) -> float:
     """Factor by which a margin may shrink in one step."""
-    return 0.0 if math.isinf(response_per_s) else math.exp(-response_per_s * config.dt_s)
+    return 0.0 if math.isinf(cbf_rate_per_s) else math.exp(-cbf_rate_per_s * config.dt_s)
 
 
 def _widest_m(config: ShieldConfig) -> float:

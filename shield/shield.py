@@ -36,8 +36,8 @@ _NUMBER = re.compile(r"([0-9]+)")
 class Shield:
     """Filters commanded heading and speed so that boats keep their distance.
 
-    Every step, `decide` sends a wanted command on unchanged when every boat still has a backup after it (and no two
-    team-mates have kept each other from turning for seconds, see `right_of_way`). Among team-mates it is otherwise the
+    Every step, `decide` sends a nominal command on unchanged when every boat still has a backup after it (and no two
+    teammates have kept each other from turning for seconds, see `right_of_way`). Among teammates it is otherwise the
     least change that keeps one,
 
         minimise |u - u_wanted|^2   subject to   h(x+) >= exp(-alpha dt) h(x)   for every pair, edge and obstacle,
@@ -170,17 +170,17 @@ class Shield:
         active = told[:, W.ACTIVE].astype(np.int64)
         return Decisions(
             fleet=fleet,
-            wanted=wanted,
-            sent=commands,
+            nominal=wanted,
+            filtered=commands,
             intervened=changed,
             reason=reason,
-            certificate_m=told[:, W.MARGIN_M],
+            safety_margin_m=told[:, W.MARGIN_M],
             slack_m=told[:, W.SLACK_M],
             bound=np.where(active >= 0, order[np.maximum(active, 0)], active),
             solve_time_s=time.perf_counter() - started,
             no_table=self._missing,
             cut_short=told[:, W.CUT_SHORT] != 0.0,
-            feared_s=told[:, W.FEARED_S],
+            adversary_horizon_s=told[:, W.FEARED_S],
             solver=told[:, W.SOLVER].astype(np.int64),
             barriers=self.config.barriers,
             area=(self.surroundings if surroundings is None else surroundings).field,
@@ -198,7 +198,7 @@ class Shield:
     ) -> BoolArray:
         """Which of k candidate commands would pass as they are in this step, (n, k); see `masks`.
 
-        Each boat's candidates are judged beside team-mates that go straight on. It is for this step alone, and the
+        Each boat's candidates are judged beside teammates that go straight on. It is for this step alone, and the
         shield stays behind it. What the shield remembers is left alone.
 
         Args:
@@ -301,7 +301,7 @@ class Shield:
     def _give(self, fleet: Fleet, state: Array, within: Commands, order: IntArray, given: Array) -> None:
         """Write what is to be decided about, for the team, or for each boat.
 
-        A boat that decides for itself knows its own nominal command and takes team-mates to hold their course.
+        A boat that decides for itself knows its own nominal command and takes teammates to hold their course.
         """
         rows = np.empty((len(fleet), W.N_GIVEN))
         rows[:, : L.N_STATE], rows[:, W.OURS] = state, fleet.controlled
@@ -309,7 +309,7 @@ class Shield:
         rows[:, W.AGE_S] = 0.0 if fleet.age_s is None else fleet.age_s
         rows[:, W.ERROR_M] = 0.0 if fleet.position_error_m is None else fleet.position_error_m
         rows[:, W.VISITING] = 0.0 if fleet.visiting is None else fleet.visiting
-        rows[:, W.HORIZON_S] = np.nan if fleet.adversary_s is None else fleet.adversary_s
+        rows[:, W.HORIZON_S] = np.nan if fleet.adversary_horizon_s is None else fleet.adversary_horizon_s
         rows[:, W.DRIVEN :] = np.nan if fleet.driven is None else fleet.driven
         given[:] = rows[order]
         if self.config.coordination == "per_boat":

@@ -78,7 +78,7 @@ class Surroundings:
             ConfigError: nothing of the field is left.
         """
         wider_m = off_m(config)
-        circles = [(x, y, r + config.hull_m + wider_m) for x, y, r in self.circles]
+        circles = [(x, y, r + config.obstacle_clearance_m + wider_m) for x, y, r in self.circles]
         circles += [(x, y, r + wider_m) for x, y, r in self.stops]
         segments = [(*polygon[k - 1], *polygon[k]) for polygon in self.polygons for k in range(len(polygon))]
         return share(
@@ -87,13 +87,13 @@ class Surroundings:
                 keep_out=np.array([(x, y, r + wider_m) for x, y, r in self.keep_out], dtype=np.float64).reshape(-1, 3),
                 circles=np.array(circles, dtype=np.float64).reshape(-1, 3),
                 segments=np.array(segments, dtype=np.float64).reshape(-1, 4),
-                segment_m=config.hull_m + wider_m,
+                segment_m=config.obstacle_clearance_m + wider_m,
                 side_m=wider_m,
                 current_mps=float(config.current_mps),
                 line=self._line(config),
                 last_circles=len(self.circles) if config.beyond_then == "stop" else 0,
                 last_segments=len(segments) if config.beyond_then == "stop" else 0,
-                last_m=LAST_SHARE * config.hull_m,
+                last_m=LAST_SHARE * config.obstacle_clearance_m,
                 registered=new_registered() if registered is None else registered,
             )
         )

@@ -167,7 +167,7 @@ def _meets_new(stayed: IntArray, scene: Scene, state: Array) -> BoolArray:
     fresh = np.ones(len(state), np.bool_)
     fresh[stayed] = False
     pursued = boats.pursuit_samples + boats.thrust_samples + boats.chased_samples
-    horizon_s = (np.maximum(boats.samples, pursued).max() + 1) * boats.sample_s + tuning.tail_s
+    horizon_s = (np.maximum(boats.samples, pursued).max() + 1) * boats.sample_s + tuning.straight_horizon_s
     top: Array = np.maximum(boats.fastest_mps, np.abs(state[:, L.SPEED]))
     gap_m = np.hypot(state[:, None, L.X] - state[None, :, L.X], state[:, None, L.Y] - state[None, :, L.Y])
     reach_m = tuning.radius_m + (top[:, None] + top[None]) * horizon_s

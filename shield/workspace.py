@@ -26,7 +26,7 @@ LARGEST_COMMAND = 1e6
 
 OURS, NOMINAL_SPEED, NOMINAL_TURN, AGE_S, ERROR_M, VISITING, HORIZON_S = (L.N_STATE + k for k in range(7))
 """Columns of ``given`` behind the state: whether the boat is decided for, its nominal command, m/s and deg relative to
-its heading, age of its track, s, bound on its position error, m, `Fleet.visiting` and `Fleet.adversary_s`."""
+its heading, age of its track, s, bound on its position error, m, `Fleet.visiting` and `Fleet.adversary_horizon_s`."""
 DRIVEN, N_GIVEN = L.N_STATE + 7, L.N_STATE + 11
 """And from there `Fleet.driven`."""
 
@@ -40,8 +40,8 @@ HAS_BACKUP, BACKUP_SIDE, BACKUP_HEADING, BACKUP_SPEED, BACKUP_MARGIN, JOINT_MARG
 no turn is left) and speed, m/s; margins verified: of all boats, of runs of several opponents, of static constraints."""
 BACKING_UP, HOLD_S, PRESSED_S, PRESSED_DEG, FREE_S, BLOCKED_BY, GIVES_WAY, N_MEMORY = range(7, 15)
 """Whether it was carried out, and for how long it still is whatever is wanted, s; and see `right_of_way`: for how long
-a team-mate has kept the boat from turning, s, its heading when that began, deg, time since it was last, s, the
-team-mate (-1: none), and the side to which it gives way (0: it does not). Then the margin against each opponent, m."""
+a teammate has kept the boat from turning, s, its heading when that began, deg, time since it was last, s, the
+teammate (-1: none), and the side to which it gives way (0: it does not). Then the margin against each opponent, m."""
 
 
 class Boats(NamedTuple):
@@ -69,7 +69,7 @@ class Boats(NamedTuple):
     n_plans: IntArray  # (n,) how many those are
     decay: Array  # (n,) factor by which a margin may shrink in one step; 0: it may fall to 0 at once
     cap_m: Array  # (n,) margins above this may shrink freely, m
-    dwell_s: Array  # (n,) least time for which a backup from opponents is carried on with, s
+    min_backup_hold_s: Array  # (n,) least time for which a backup from opponents is carried on with, s
     tables: Tables
     table: IntArray  # (n, n) table of each own boat (row) with each opponent (column), -1 for none
     table_margin_m: float  # added to the radius where a table is looked into, m
@@ -125,18 +125,18 @@ class Tuning(NamedTuple):
     moves: int  # steps of the model in one of decisions, under one command
     radius_m: float  # separation radius with buffer
     buffer_m: float  # the buffer in it
-    tail_s: float  # how long straight runs are continued beyond the horizon
+    straight_horizon_s: float  # how long straight runs are continued beyond the horizon
     margin_cap_m: float  # margins above this are not looked at closely
     speed_weight: float  # cost of changing the speed by top speed, full rudder to no rudder costing 1
-    mate_cap_m: float  # margins from team-mates above this may shrink freely
+    teammate_margin_cap_m: float  # margins from teammates above this may shrink freely
     static_decay: float  # factor by which a margin from static constraints may shrink in one step
-    give_way_after_s: float  # time a boat is kept from turning before one of the two gives way
-    feared_s: float  # time for which an opponent is adversarial; 0: nobody is
-    visitor_s: float  # the same of opponents on our side of a field
+    deadlock_timeout_s: float  # time a boat is kept from turning before one of the two gives way
+    adversary_horizon_s: float  # time for which an opponent is adversarial; 0: nobody is
+    intruder_horizon_s: float  # the same of opponents on our side of a field
     position_error_m: float  # bound on the error of every position
     delay_s: float  # time from own commands to their effect
     track_error_mps: float  # how fast what is known of a position goes bad
-    search_limit: float  # cost at which a decision searches no further, see `backup.assign`
+    work_budget: float  # cost at which a decision searches no further, see `backup.assign`
 
 
 class Scene(NamedTuple):
@@ -299,7 +299,7 @@ def all_spent(scene: Scene) -> bool:
     Every boat then keeps the best manoeuvre found for it so far, at first the one it has held since the last decision,
     and what is sent passes the same exact check as ever.
     """
-    if scene.spent[0] <= scene.tuning.search_limit:
+    if scene.spent[0] <= scene.tuning.work_budget:
         return False
     scene.cut_short[0] = True
     return True

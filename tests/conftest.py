@@ -94,6 +94,6 @@ def synthetic_record(meta, steps, seed=3):
         sent=sent,
         reason=reason,
         intervened=intervened,
-        certificate_m=certificate,
+        safety_margin_m=certificate,
         breaches=find_breaches(position, meta["separation_m"]),
     )

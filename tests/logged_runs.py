@@ -89,7 +89,7 @@ class Encounter:
         for number in range(self.steps):
             tick = self.tick(number)
             yield self.edit(tick)
-            obeyed = tick.decisions.sent if self.shielded else tick.wanted
+            obeyed = tick.decisions.filtered if self.shielded else tick.wanted
             for i in range(4):
                 speed, heading = obeyed.absolute(i, tick.fleet.heading_rad[i])
                 error = (math.degrees(heading) - self.state[i, L.HEADING] + 180.0) % 360.0 - 180.0
@@ -104,7 +104,9 @@ class Encounter:
             self.shield.reset()
         decisions = self.shield.decide(fleet, wanted, fixed)
         sent = {
-            name: Sent(name, now_s + 0.002, *decisions.sent.absolute(i, fleet.heading_rad[i])[::-1], "attitude", True)
+            name: Sent(
+                name, now_s + 0.002, *decisions.filtered.absolute(i, fleet.heading_rad[i])[::-1], "attitude", True
+            )
             for i, name in enumerate(NAMES[:2])
         }
         return Tick(

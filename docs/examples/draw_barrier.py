@@ -22,7 +22,7 @@ def margin(shield, east_m, north_m):
         platforms="heron",
     )
     shield.reset()
-    return shield.decide(fleet, NORTH)[0].certificate_m
+    return shield.decide(fleet, NORTH)[0].safety_margin_m
 
 
 east, north = np.arange(0.0, 7.1, STEP_M), np.arange(-9.0, 6.1, STEP_M)  # the other half is its mirror image
@@ -31,7 +31,7 @@ angle = np.linspace(0.0, 2.0 * np.pi, 90)
 figure = Figure(figsize=(7.2, 4.6), layout="constrained")
 for plan, (profile, title) in zip(
     figure.subplots(1, 2, sharey=True),
-    [("hold-course", "opponent holds its course"), ("rammers", "opponent pursues")],
+    [("constant_velocity", "opponent holds its course"), ("ramming", "opponent pursues")],
     strict=True,
 ):
     for level, shade in zip(LEVELS_M, ("tab:red", "tab:purple", "tab:blue"), strict=True):
@@ -46,6 +46,6 @@ for plan, (profile, title) in zip(
     plan.plot(2.5 * np.cos(angle), 2.5 * np.sin(angle), color="tab:orange", lw=1.0)
     plan.plot(0.0, 0.0, "v", color="tab:orange", ms=9)
     plan.set(xlabel="east, m", aspect="equal", title=title)
-    plan.set_ylabel("north, m; our boat sails north" if profile == "hold-course" else "")
+    plan.set_ylabel("north, m; our boat sails north" if profile == "constant_velocity" else "")
 if PICTURE:
     figure.savefig(PICTURE, dpi=140)

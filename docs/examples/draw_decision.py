@@ -40,12 +40,14 @@ def roll_out(boat, turn_deg):
 theirs = roll_out(1, 0.0)
 paths = {turn: roll_out(0, turn) for turn in range(-180, 181, 15)}
 margins = {turn: np.hypot(*(path - theirs).T) - SEPARATION_M - BUFFER_M for turn, path in paths.items()}
-decision = Shield(separation_m=SEPARATION_M, profile="hold-course").decide(
+decision = Shield(separation_m=SEPARATION_M, profile="constant_velocity").decide(
     fleet, Commands.absolute_rad([[2.0, 0.0], [2.0, math.pi]])
 )[0]
-side = math.copysign(1.0, math.sin(decision.sent_heading_rad))  # by symmetry either would do
+side = math.copysign(1.0, math.sin(decision.filtered_heading_rad))  # by symmetry either would do
 best = max((turn for turn in paths if turn * side > 0), key=lambda turn: margins[turn].min())
-print(f"{len(paths)} manoeuvres; the best keeps {margins[best].min():.2f} m, the shield {decision.certificate_m:.2f} m")
+print(
+    f"{len(paths)} manoeuvres; the best keeps {margins[best].min():.2f} m, the shield {decision.safety_margin_m:.2f} m"
+)
 
 figure = Figure(figsize=(7.2, 4.2), layout="constrained")
 plan, time = figure.subplots(1, 2, width_ratios=(1.25, 1.0))

@@ -15,4 +15,9 @@ fleet = Fleet.of(
 )
 wanted = Commands.absolute_rad([[2.0, 0.0], [2.0, math.pi]])  # speed, heading: straight on
 d = shield.decide(fleet, wanted)[0]
-print(d.reason.name, f"{math.degrees(d.sent_heading_rad):.1f} deg", d.binding, f"margin {d.certificate_m:.3f} m")
+print(
+    d.reason.name,
+    f"{math.degrees(d.filtered_heading_rad):.1f} deg",
+    d.active_constraints,
+    f"margin {d.safety_margin_m:.3f} m",
+)

@@ -30,8 +30,8 @@ boat[:] = fresh_state(0.0, 0.0, 0.0)
 for _ in range(400):
     decisions = shield.decide(fleet, Commands.relative_deg([[1.5, -boat[2]]]))  # north, where the ferry comes from
     if decisions[0].intervened:
-        bound.add((decisions[0].reason.name, *decisions[0].binding))
-    step_boat(params, boat, *decisions.sent.values[0], 0.1)
+        bound.add((decisions[0].reason.name, *decisions[0].active_constraints))
+    step_boat(params, boat, *decisions.filtered.values[0], 0.1)
     FERRY[1] += 0.1 * FERRY[3]
     nearest = min(nearest, margin(boat[0], boat[1], 0.0, FERRY))
 print(*sorted(bound))

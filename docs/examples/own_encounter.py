@@ -19,7 +19,7 @@ def closest_m(shield):
     for _ in range(250):
         commands = WANTED.values
         if shield is not None:
-            commands = shield.decide(replace(OF, state=state.copy()), WANTED).sent.values
+            commands = shield.decide(replace(OF, state=state.copy()), WANTED).filtered.values
         for row, (speed_mps, heading_rad) in zip(state, commands, strict=True):
             error_deg = (np.degrees(heading_rad) - row[L.HEADING] + 180.0) % 360.0 - 180.0
             step_boat(params, row, speed_mps, error_deg, DT_S)

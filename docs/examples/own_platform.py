@@ -19,4 +19,4 @@ fleet = Fleet.of(
     position_m=[[0, 0], [0, 5.5]], heading_rad=[0, math.pi], speed_mps=[1.5, 1.5], team=[0, 1], platforms="launch"
 )
 decision = Shield().decide(fleet, Commands.absolute_rad([[1.5, 0.0], [1.5, math.pi]]))[0]
-print(f"launch turns to {math.degrees(decision.sent_heading_rad):.0f} deg ({decision.reason.name})")
+print(f"launch turns to {math.degrees(decision.filtered_heading_rad):.0f} deg ({decision.reason.name})")

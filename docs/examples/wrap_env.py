@@ -13,4 +13,6 @@ observations, infos = env.reset(seed=4)
 for _ in range(50):
     observations, rewards, terminated, truncated, infos = env.step({agent: 4 for agent in env.agents})
 decision = infos["agent_0"]["shield"]
-print(decision.reason.name, f"margin {decision.certificate_m:.2f} m", "changed" if decision.intervened else "as wanted")
+print(
+    decision.reason.name, f"margin {decision.safety_margin_m:.2f} m", "changed" if decision.intervened else "as wanted"
+)

@@ -66,8 +66,8 @@ def _marks_to_keep_clear(canvas: Canvas, scene: Scene) -> list[pygame.Rect]:
 def _shield_text(scene: Scene, boat: int, arena: Arena) -> str:
     if scene.overlay is None:
         return ""
-    certificate_m = float(scene.overlay.certificate_m[boat])
-    margin = f"  {certificate_m:+.1f} m".replace("-", "−") if np.isfinite(certificate_m) else ""
+    safety_margin_m = float(scene.overlay.safety_margin_m[boat])
+    margin = f"  {safety_margin_m:+.1f} m".replace("-", "−") if np.isfinite(safety_margin_m) else ""
     reason = int(scene.overlay.reason[boat])
     return ("changed" if reason == NOT_COVERED else arena.reason_text(reason)) + margin
 

@@ -24,14 +24,14 @@ class Overlay:
         sent: (n, 2) likewise, what the boats were told.
         reason: (n,) shield reason codes.
         intervened: (n,) bool.
-        certificate_m: (n,) NaN where there is none.
+        safety_margin_m: (n,) NaN where there is none.
     """
 
     wanted: np.ndarray
     sent: np.ndarray
     reason: np.ndarray
     intervened: np.ndarray
-    certificate_m: np.ndarray
+    safety_margin_m: np.ndarray
 
     @classmethod
     def of_commands(cls, wanted: np.ndarray, sent: np.ndarray) -> Overlay:
@@ -122,7 +122,7 @@ class Scene:
         """
         first = max(0, step - round(TRAIL_S / dt_s))
         asked = min(step, len(record["wanted"]) - 1)
-        commands = ("wanted", "sent", "reason", "intervened", "certificate_m")
+        commands = ("wanted", "sent", "reason", "intervened", "safety_margin_m")
         overlay = None if asked < 0 else Overlay(*(record[name][asked] for name in commands))
         trail_m = record["position"][first : step + 1]
         disabled = record["is_disabled"][step] if "is_disabled" in record else np.zeros(trail_m.shape[1], dtype=bool)

@@ -25,14 +25,14 @@ class Games(NamedTuple):
     memory: Array
     sent: Array
     reason: IntArray
-    certificate_m: Array
+    safety_margin_m: Array
 
 
 @kernel
 def game_of(games: Games, b: int) -> Games:
     """One of the games: arrays without the leading games axis."""
-    state, wanted, ours, memory, sent, reason, certificate_m = games
-    return Games(state[b], wanted[b], ours[b], memory[b], sent[b], reason[b], certificate_m[b])
+    state, wanted, ours, memory, sent, reason, safety_margin_m = games
+    return Games(state[b], wanted[b], ours[b], memory[b], sent[b], reason[b], safety_margin_m[b])
 
 
 class BatchGuard(ABC):
@@ -47,7 +47,7 @@ class BatchGuard(ABC):
 
     Attributes:
         reason: (B, n) why each command is what it is.
-        certificate_m: (B, n) margin left, m, inf where nobody is near.
+        safety_margin_m: (B, n) margin left, m, inf where nobody is near.
         sent: (B, n, 2) the commands of the last decision.
         memory: (B, n, columns) what is kept of each boat between decisions.
         radius_m: distance to keep: separation, buffer and both position errors, m.
@@ -75,7 +75,7 @@ class BatchGuard(ABC):
         self.radius_m = config.separation_m + config.buffer_m + 2.0 * config.position_error_m
         shape = (int(games), len(platforms))
         self.reason = np.zeros(shape, np.int64)
-        self.certificate_m = np.full(shape, np.inf)
+        self.safety_margin_m = np.full(shape, np.inf)
         self.sent = np.zeros((*shape, 2))
         self.memory = np.full((*shape, self.columns), self.forgotten)
 
@@ -83,7 +83,7 @@ class BatchGuard(ABC):
         """Forget the last decisions of the games in ``mask`` (B,), or of all."""
         which = slice(None) if mask is None else mask
         self.reason[which] = 0
-        self.certificate_m[which] = np.inf
+        self.safety_margin_m[which] = np.inf
         self.memory[which] = self.forgotten
 
     def decide(self, state: Array, wanted: Array, ours: BoolArray) -> Array:
@@ -95,17 +95,17 @@ class BatchGuard(ABC):
             ours: (B, n) boats to decide for.
 
         Returns:
-            (B, n, 2) commands, reused by the next call. ``reason`` and ``certificate_m`` (B, n) tell why.
+            (B, n, 2) commands, reused by the next call. ``reason`` and ``safety_margin_m`` (B, n) tell why.
 
         Raises:
             FleetError: an array has the wrong shape, a state is not finite, or what else the guard cannot decide on.
         """
         state, wanted, ours = np.asarray(state), np.asarray(wanted), np.asarray(ours)
         self._check(state, wanted, ours)
-        self.sent[:], self.reason[:], self.certificate_m[:] = wanted, 0, np.inf
+        self.sent[:], self.reason[:], self.safety_margin_m[:] = wanted, 0, np.inf
         asked = np.ascontiguousarray(state, dtype=np.float64), np.ascontiguousarray(wanted, dtype=np.float64)
         boats = np.ascontiguousarray(ours, dtype=np.bool_)
-        self._decide(Games(*asked, boats, self.memory, self.sent, self.reason, self.certificate_m))
+        self._decide(Games(*asked, boats, self.memory, self.sent, self.reason, self.safety_margin_m))
         return self.sent
 
     def _check(self, state: Array, wanted: Array, ours: BoolArray) -> None:
@@ -119,7 +119,7 @@ class BatchGuard(ABC):
         if not (np.abs(state[:, :, : L.SPEED_ERROR]) <= LARGEST).all() or (np.abs(state) > LARGEST).any():
             raise FleetError(f"a boat's position, heading, speed, thrust or rudder is not finite or beyond {LARGEST:g}")
         if self.needs_commands and not (np.abs(wanted[ours.astype(bool)]) <= LARGEST).all():
-            raise FleetError(f"a wanted command is not finite or beyond {LARGEST:g}; give a speed and a heading")
+            raise FleetError(f"a nominal command is not finite or beyond {LARGEST:g}; give a speed and a heading")
 
     @abstractmethod
     def _decide(self, games: Games) -> None:

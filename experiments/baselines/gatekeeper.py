@@ -1,4 +1,4 @@
-"""gatekeeper: the wanted command for as long as possible, then a backup that is known to be safe. Compiled.
+"""gatekeeper: the nominal command for as long as possible, then a backup that is known to be safe. Compiled.
 
 Source: Agrawal, Chen, Panagou, "gatekeeper: Online Safety Verification and Control for Nonlinear Systems in Dynamic
 Environments" (T-RO 2024, arXiv 2211.14361), and the search over switching times of several agents of arXiv 2604.02401.
@@ -11,13 +11,13 @@ What the papers leave to the user, and what stands here:
 
 | left open | here |
 | --- | --- |
-| nominal trajectory | the wanted command held, speed and absolute heading: a filter is not told a policy's plans |
+| nominal trajectory | the nominal command held, speed and absolute heading: a filter is not told a policy's plans |
 | backup controller | the manoeuvre of the library with the greatest least clearance |
 | model | the boat's hull and autopilot, step by step: what is committed is what the boat does |
 | backup set | nobody comes within the radius, ever, if from the end on every boat holds its course |
 | others | opponents hold course and speed; or fill the disc they can reach (then the backup set is not asked for) |
 | the first committed trajectory | to stop on the present heading |
-| who plans when | team-mates one after the other within a step, in the order of their numbers |
+| who plans when | teammates one after the other within a step, in the order of their numbers |
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def follow_wanted(
     setup: R.Setup, i: int, state: Array, speed: float, heading: float, around: R.Around,
     trail: Array, least_m: Array,
 ) -> None:  # fmt: skip
-    """Write the states (S+1, N_STATE) under the wanted command, and the least clearance (S+1,) up to each, m."""
+    """Write the states (S+1, N_STATE) under the nominal command, and the least clearance (S+1,) up to each, m."""
     trail[0] = state
     least_m[0] = R.gap_at(setup, around, 0, state[L.X], state[L.Y])
     for k in range(1, trail.shape[0]):
@@ -107,7 +107,7 @@ def _decide_boat(setup: R.Setup, i: int, state: Array, around: R.Around, plan: A
 
 @kernel
 def decide_game(setup: R.Setup, game: Games) -> None:
-    """Decide for the boats of ours, one after the other; ``sent`` starts as the wanted commands."""
+    """Decide for the boats of ours, one after the other; ``sent`` starts as the nominal commands."""
     state, _, ours, plan, sent, reason, clear_m = game
     n, steps = state.shape[0], setup.switches[0] + setup.steps
     path, grow, near = np.empty((n, steps + 1, 2)), np.empty(n), np.empty(n, np.bool_)

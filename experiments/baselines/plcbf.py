@@ -14,12 +14,12 @@ What the paper leaves to the user, and what stands here:
 
 | left open | here |
 | --- | --- |
-| library | the wanted command held; the mode taken last, anchored as it was; `rollouts.library` from the heading now |
+| library | the nominal command held; the mode taken last, anchored as it was; `rollouts.library` from the heading now |
 | inputs u | acceleration and turn rate as shares of braking and of the largest turn now, as the textbook filters have |
 | dV_m/dt | the step of the sampled boat, (V_m(x+) - V_m(x)) / dt, x+ by hull and autopilot, others one step on |
 | its gradient in u | finite differences of V_m(x+) by `DIFFERENCE` of each input |
 | least invasive | the row that leaves the largest part of the inputs, as in the authors' code; or the nearest answer |
-| several agents | opponents hold course; team-mates hold what they were told last, or in this step if decided for |
+| several agents | opponents hold course; teammates hold what they were told last, or in this step if decided for |
 """
 
 from __future__ import annotations
@@ -145,7 +145,7 @@ def answer_of(row: Array, need: float, box: Array, z0: Array, z: Array) -> bool:
 
 @kernel
 def _command_of_mode(setup: R.Setup, i: int, m: int, state: Array, wanted: Array, plan: Array) -> tuple[float, float]:
-    """Speed and absolute heading of mode m: the wanted command held, the mode taken last, then the library."""
+    """Speed and absolute heading of mode m: the nominal command held, the mode taken last, then the library."""
     if m == WANTED:
         return wanted[0], wrap_degrees(state[L.HEADING] + wanted[1])
     if m == LAST:
@@ -244,7 +244,7 @@ def _decide_boat(setup: R.Setup, i: int, state: Array, around: R.Around, plan: A
 
 @kernel
 def decide_game(setup: R.Setup, game: Games) -> None:
-    """Decide for the boats of ours, one after the other; ``sent`` starts as the wanted commands."""
+    """Decide for the boats of ours, one after the other; ``sent`` starts as the nominal commands."""
     state, _, ours, plan, sent, reason, clear_m = game
     n, steps = state.shape[0], setup.steps + 1
     path, grow, near = np.empty((n, steps + 1, 2)), np.empty(n), np.empty(n, np.bool_)

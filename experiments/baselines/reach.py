@@ -1,7 +1,7 @@
 """`ReachGuard`: a safety filter of the reachability value tables alone, in the place where the shield stands.
 
 Margins of pairs of boats are h_ij = V(x_i, x_j) - R, V the distance that can be kept from now on by the value tables:
-against the worst an opponent can do for as long as it is feared, or with the help of a team-mate. Within a step, of
+against the worst an opponent can do for as long as it is feared, or with the help of a teammate. Within a step, of
 which the tables say nothing, opponents move in each of three ways, and the least of the three values counts.
 
 One decision for all boats of ours in a game: screen, program, exact check, else the rudder of greatest value. The
@@ -10,7 +10,7 @@ With x+ the state after a candidate, the least change meets, for each pair and e
 
     V(x+) + dV/dpsi (psi - psi+) + dV/dv (v - v+) >= R + target,   target = max(0, e^(-response dt) min(h(x), cap)),
 
-with the same terms of a team-mate decided for together. It counts when h(x+) >= target after it by the full model.
+with the same terms of a teammate decided for together. It counts when h(x+) >= target after it by the full model.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def near_pairs(setup: Setup, state: Array, ours: BoolArray) -> IntArray:
     """Pairs (m, 4) within their table's range: boat i of ours, boat j, and which of j's states of `ahead` count.
 
     These are, from the first to before the last: the one under its commands, if both are decided for together (which
-    is a pair once), every way of an opponent, and the first of another team-mate.
+    is a pair once), every way of an opponent, and the first of another teammate.
     """
     pairs, m = np.zeros((setup.table.size, 4), np.int64), 0
     for i, j in np.ndindex(setup.table.shape):
@@ -309,7 +309,7 @@ def _short(pairs: IntArray, h: Array, target: Array, movers: BoolArray) -> bool:
 @kernel
 def decide_game(setup: Setup, game: Games) -> None:  # noqa: C901 - copies of rows, in loops that compile quickly
     """Decide for the boats of ours in one game, (n, ...) each."""
-    state, wanted, ours, memory, sent, reason, certificate_m = game
+    state, wanted, ours, memory, sent, reason, safety_margin_m = game
     n = len(ours)
     for i in range(n):
         reason[i] = PASSED if ours[i] else NOT_COVERED
@@ -335,12 +335,12 @@ def decide_game(setup: Setup, game: Games) -> None:  # noqa: C901 - copies of ro
             _take_backups(setup, game, pairs, movers)
             copy_row(h, margins(setup, pairs, ahead(setup, state, ours, sent, 1)))
             moved = _short(pairs, h, target, movers)
-    copy_row(certificate_m, least(pairs, h, n))
+    copy_row(safety_margin_m, least(pairs, h, n))
     for i in range(n):
         if not ours[i]:
             continue
         if movers[i]:
-            reason[i] = BACKUP if certificate_m[i] >= 0.0 else BEST_EFFORT
+            reason[i] = BACKUP if safety_margin_m[i] >= 0.0 else BEST_EFFORT
         elif reason[i] != LEAST_CHANGE:
             for c in range(memory.shape[1]):
                 memory[i, c] = 0.0
@@ -354,7 +354,7 @@ def decide_games(setup: Setup, games: Games) -> None:
 
 
 NAME = "reach"
-SETTINGS = ("response_per_s", "margin_cap_m", "speed_weight", "adversary_s", "profile", "buffer_m")
+SETTINGS = ("cbf_rate_per_s", "margin_cap_m", "speed_weight", "adversary_horizon_s", "profile", "buffer_m")
 """Settings of `ShieldConfig` that may be given with the name; separation, position error and step count too."""
 
 
@@ -374,7 +374,7 @@ class ReachGuard(BatchGuard):
     """Commands kept where the value tables promise the separation; what is not said here is as in `BatchGuard`.
 
     Reasons are the shield's: 0 passed bit for bit, 1 changed by the program, 3 backup, 4 best effort (no rudder and no
-    braking keeps the separation), 5 no usable command, so the boat holds, 6 not decided for. ``certificate_m`` is the
+    braking keeps the separation), 5 no usable command, so the boat holds, 6 not decided for. ``safety_margin_m`` is the
     least value after this step less the radius kept, m, inf where nobody is within the tables' range. Static
     constraints and the field's edge are not kept clear of.
 
@@ -404,10 +404,10 @@ class ReachGuard(BatchGuard):
             team=np.array(team, dtype=np.int64),
             full_deg=np.array([abs(turn_of_rudder(*rudder, config.dt_s)) for rudder in rudders]),
             radius_m=self.radius_m,
-            decay=math.exp(-config.response_per_s * config.dt_s),
+            decay=math.exp(-config.cbf_rate_per_s * config.dt_s),
             cap_m=min(config.margin_cap_m, cap_m - self.radius_m),
             dt_s=config.dt_s,
-            fear_s=min(config.feared_s, WHOLE_S),
+            fear_s=min(config.effective_adversary_horizon_s, WHOLE_S),
             speed_weight=config.speed_weight,
             look=max((round(table.card.dt_s / config.dt_s) for table in tables), default=1),
         )

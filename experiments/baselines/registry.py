@@ -33,7 +33,7 @@ class Guard(Protocol):
     """What filters the commands of a batch of games; the batched shield is one."""
 
     reason: IntArray
-    certificate_m: Array
+    safety_margin_m: Array
 
     def decide(self, state: Array, wanted: Array, ours: BoolArray) -> Array:
         """Commands (B, n, 2), speed m/s and relative heading deg, for the boats of ``ours`` (B, n)."""
@@ -49,10 +49,10 @@ class NoGuard:
 
     def __init__(self, games: int, boats: int) -> None:
         self.reason = np.zeros((games, boats), np.int64)
-        self.certificate_m = np.full((games, boats), np.inf)
+        self.safety_margin_m = np.full((games, boats), np.inf)
 
     def decide(self, state: Array, wanted: Array, ours: BoolArray) -> Array:
-        """The wanted commands themselves."""
+        """The nominal commands themselves."""
         return wanted
 
 

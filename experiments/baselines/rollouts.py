@@ -243,7 +243,7 @@ class RolloutGuard(BatchGuard):
 
     Reasons: 0 passed bit for bit, 1 changed (gatekeeper: the backup begins now), 2 gatekeeper: no candidate is valid
     and the committed trajectory goes on; PL-CBF: its program has no answer and the boat follows the mode taken.
-    ``certificate_m`` is the least clearance of what is committed, or the value of the mode taken, m; inf where nobody
+    ``safety_margin_m`` is the least clearance of what is committed, or the value of the mode taken, m; inf where nobody
     is within reach. Fixed things and the field's edge are not kept clear of.
 
     Args:

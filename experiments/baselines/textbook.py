@@ -48,7 +48,7 @@ class TextbookGuard(BatchGuard):
 
     Reasons: 0 passed bit for bit, 1 changed, 2 the program had no answer and was relaxed (the command may then be
     the wanted one, where no input helps), 3 not even the relaxed program was solved: the boat is told to stop.
-    ``certificate_m`` is the distance to the nearest boat less the radius kept, m.
+    ``safety_margin_m`` is the distance to the nearest boat less the radius kept, m.
 
     Args:
         name: one of `NAMES`.
@@ -87,7 +87,7 @@ class TextbookGuard(BatchGuard):
         acts, need = np.ascontiguousarray(np.moveaxis(acts, 0, 3)), np.ascontiguousarray(need)
         decide_games(self._setup, games, acts, need)
         gap = np.where(np.eye(len(self.params), dtype=bool), np.inf, np.hypot(*p)).min(axis=2)
-        games.certificate_m[ours] = (gap - self.radius_m)[ours]
+        games.safety_margin_m[ours] = (gap - self.radius_m)[ours]
 
 
 def _between(of: Array) -> Array:

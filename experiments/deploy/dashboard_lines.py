@@ -35,7 +35,7 @@ GROWING = (("closest", 26), ("boat", 16), ("bound by", 24), ("closest", 400))
 DROPPED = ("bound by", "hdg", "m/s", "age", "closest", "why", "margin")
 """What is left out of a terminal too narrow for all, in this order; wanted and sent stand in every one, whole."""
 WHY = {
-    Reason.PASSED: ("passed", "green", "the wanted command leaves the boat a way out: sent as it is"),
+    Reason.PASSED: ("passed", "green", "the nominal command leaves the boat a way out: sent as it is"),
     Reason.LEAST_CHANGE: ("least", "cyan", "changed as little as it takes to keep clear of everything"),
     Reason.QP_RELAXED: ("QP slack", "yellow", "of logs of 0.2.0 and before"),
     Reason.BACKUP: ("backup", "yellow", "its backup manoeuvre, which keeps clear of all boats"),
@@ -44,10 +44,10 @@ WHY = {
         "bold red",
         "no manoeuvre keeps the margin, this one most of it: give it room, or SPACE",
     ),
-    Reason.HELD: ("held", "magenta", "the wanted command is unusable: told to stop on its course"),
+    Reason.HELD: ("held", "magenta", "the nominal command is unusable: told to stop on its course"),
     Reason.NOT_COVERED: ("-", "dim", "this shield does not decide for the boat"),
-    Reason.RIGHT_OF_WAY: ("way", "cyan", "two team-mates kept each other from turning: one gives way, one stands on"),
-    Reason.LIMITED: ("limit", "yellow", "more speed was wanted than the boat can do"),
+    Reason.RIGHT_OF_WAY: ("way", "cyan", "two teammates kept each other from turning: one gives way, one stands on"),
+    Reason.LIMITED: ("limit", "yellow", "more speed was asked than the boat can do"),
     Reason.STOPPED: (
         "stopped",
         "bold red",

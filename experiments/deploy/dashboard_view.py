@@ -279,11 +279,11 @@ def _own(reading: BoatReading, decision: Decision | None, tick: Tick, near: Text
         return {**cells, "why": Text("undecided", "red")}
     if decision.intervened:
         sent_text.stylize("bold cyan")
-    wanted = _command(decision.wanted_speed_mps, decision.wanted_heading_rad)
-    margin = Text("free" if decision.certificate_m == math.inf else f"{decision.certificate_m:.1f}")
-    if decision.certificate_m < 0.0:
+    wanted = _command(decision.nominal_speed_mps, decision.nominal_heading_rad)
+    margin = Text("free" if decision.safety_margin_m == math.inf else f"{decision.safety_margin_m:.1f}")
+    if decision.safety_margin_m < 0.0:
         margin.stylize("bold red")
-    why = {"why": Text(*WHY[decision.reason][:2]), "bound by": ", ".join(decision.binding)}
+    why = {"why": Text(*WHY[decision.reason][:2]), "bound by": ", ".join(decision.active_constraints)}
     return {**cells, "wanted": wanted, "margin": margin, **why}
 
 

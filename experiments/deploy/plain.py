@@ -49,7 +49,7 @@ class Tally:
         self.commands += int(own.sum())
         self.changed += decisions.count_intervened
         self._best_effort += int((decisions.reason[own] == Reason.BEST_EFFORT).sum())
-        self._least_m = min(self._least_m, float(decisions.certificate_m[own].min(initial=math.inf)))
+        self._least_m = min(self._least_m, float(decisions.safety_margin_m[own].min(initial=math.inf)))
         self.closest_m = min(self.closest_m, closest_m(tick.fleet))
 
     def close(self) -> None:

@@ -97,7 +97,7 @@ def _decided(tick: Tick) -> dict[str, tuple[float, float]]:
     """Speed m/s and heading rad decided for each boat that the shield steered."""
     if tick.decisions is None:
         return {}
-    fleet, commands = tick.decisions.fleet, tick.decisions.sent
+    fleet, commands = tick.decisions.fleet, tick.decisions.filtered
     return {
         name: commands.absolute(i, float(fleet.heading_rad[i]))
         for i, name in enumerate(fleet.names)
@@ -125,7 +125,7 @@ def _declares_stop(tick: Tick, name: str) -> bool:
     return stopped or any((action.subject, action.condition) == (name, OWN_STOP) for action in tick.actions)
 
 
-FIELDS = ("intervened", "reason", "certificate_m", "slack_m", "bound")
+FIELDS = ("intervened", "reason", "safety_margin_m", "slack_m", "bound")
 """Arrays of a decision that are compared, beside the sent commands; the time it took is not."""
 
 
@@ -258,7 +258,7 @@ class Prover:
     def _compare(self, tick: Tick, recorded: Decisions) -> Difference | None:
         time_s = tick.began_s - self._header.clock_s
         try:
-            replayed = self._shield.decide(recorded.fleet, recorded.wanted, tick.surroundings)
+            replayed = self._shield.decide(recorded.fleet, recorded.nominal, tick.surroundings)
         except SteerclearError as error:
             return Difference(tick.number, time_s, "", "decision", "decided", f"refused: {error}")
         for boat, what, a, b in _differing(recorded, replayed):
@@ -281,10 +281,10 @@ def exact(value: Any) -> str:
 
 def _differing(recorded: Decisions, replayed: Decisions) -> Iterator[tuple[str, str, Any, Any]]:
     """Boat, name of the value and the two values, for every value that differs in a bit."""
-    if recorded.sent.relative != replayed.sent.relative:
-        yield "", "frame of the command", recorded.sent.relative, replayed.sent.relative
-    pairs = [("sent speed, m/s", recorded.sent.values[:, 0], replayed.sent.values[:, 0])]
-    pairs += [("sent heading", recorded.sent.values[:, 1], replayed.sent.values[:, 1])]
+    if recorded.filtered.relative != replayed.filtered.relative:
+        yield "", "frame of the command", recorded.filtered.relative, replayed.filtered.relative
+    pairs = [("sent speed, m/s", recorded.filtered.values[:, 0], replayed.filtered.values[:, 0])]
+    pairs += [("sent heading", recorded.filtered.values[:, 1], replayed.filtered.values[:, 1])]
     pairs += [(name, getattr(recorded, name), getattr(replayed, name)) for name in FIELDS]
     for name, a, b in pairs:
         for i in np.flatnonzero(_bits(a) != _bits(b)):

@@ -357,9 +357,9 @@ def _show_sides(console: Console, replay: Replay) -> None:
     table = Table("", "with the shield", "without", title="Own boats", title_justify="left")
     sides = [replay.sides[side] for side in ("with", "without")]
     for key, name in (
-        ("closest_teammate_m", "closest team-mate, m"),
+        ("closest_teammate_m", "closest teammate, m"),
         ("closest_opponent_m", "closest other boat, m"),
-        ("breaches_teammate", "breaches with team-mates"),
+        ("breaches_teammate", "breaches with teammates"),
         ("breaches_opponent", "breaches with others"),
     ):
         table.add_row(name, *(_number(side[key]) for side in sides))

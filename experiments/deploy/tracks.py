@@ -43,7 +43,7 @@ class Tracks:
         wanted, sent: (T, n, 2) speed m/s and absolute heading rad in [0, 2 pi); NaN where nothing was decided.
         reason: (T, n); NOT_COVERED where nothing was decided.
         intervened: (T, n) bool.
-        certificate_m: (T, n); NaN where nothing was decided.
+        safety_margin_m: (T, n); NaN where nothing was decided.
         driven: (T, n) bool, the game steered the boat.
         games: (T,) state of the game at each step.
         dt_s: step, s.
@@ -60,7 +60,7 @@ class Tracks:
     sent: Array
     reason: NDArray[np.int64]
     intervened: NDArray[np.bool_]
-    certificate_m: Array
+    safety_margin_m: Array
     driven: NDArray[np.bool_]
     games: list[Mapping[str, Any]]
     dt_s: float
@@ -72,7 +72,7 @@ class Tracks:
 
 
 _DECIDED = np.dtype(
-    [("wanted", "f8", 2), ("sent", "f8", 2), ("reason", "i8"), ("intervened", "?"), ("certificate_m", "f8")]
+    [("wanted", "f8", 2), ("sent", "f8", 2), ("reason", "i8"), ("intervened", "?"), ("safety_margin_m", "f8")]
 )
 """One boat's part of one tick."""
 _NOTHING = ((math.nan, math.nan), (math.nan, math.nan), int(Reason.NOT_COVERED), False, math.nan)
@@ -157,15 +157,15 @@ class TrackBuilder:
         found = {}
         for i, name in enumerate(decisions.fleet.names):
             if not decisions.fleet.controlled[i] or (self._header.boats and name not in self._mine):
-                continue  # team-mates with a shield of their own are steered by another process
+                continue  # teammates with a shield of their own are steered by another process
             own_rad = float(decisions.fleet.heading_rad[i])
             self._ours.add(name)
             found[name] = (
-                decisions.wanted.absolute(i, own_rad),
-                decisions.sent.absolute(i, own_rad),
+                decisions.nominal.absolute(i, own_rad),
+                decisions.filtered.absolute(i, own_rad),
                 int(decisions.reason[i]),
                 bool(decisions.intervened[i]),
-                float(decisions.certificate_m[i]),
+                float(decisions.safety_margin_m[i]),
             )
         return found
 
@@ -321,7 +321,7 @@ def record_of(header: LogHeader, tracks: Tracks, states: Array, title: str, shie
         sent=_degrees(tracks.sent) if shielded else wanted,
         reason=np.where(covered, tracks.reason, NOT_COVERED),
         intervened=tracks.intervened & covered,
-        certificate_m=np.where(covered, tracks.certificate_m, np.nan),
+        safety_margin_m=np.where(covered, tracks.safety_margin_m, np.nan),
         breaches=find_breaches(placed(states)[:, :, : L.Y + 1], header.config.separation_m),
     )
 

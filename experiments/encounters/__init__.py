@@ -3,13 +3,13 @@
 From Python::
 
     from steerclear.experiments.encounters import Conditions, measure
-    outcome = measure("rammer_1", "shield:adversary_s=9", own="heron", other="heron", n=200, seed=0,
+    outcome = measure("rammer_1", "shield:adversary_horizon_s=9", own="heron", other="heron", n=200, seed=0,
                       conditions=Conditions(radius_m=2.5))
     outcome.summary["breached"], outcome.columns["closest_m"].min()
 
 ``draw`` gives the scenes alone, ``play`` plays them with any guard (a safety filter) and returns every state. A guard
 decides in water and in the dark as the batched shield does: ``decide(state, wanted, ours) -> sent``, ``reason``,
-``certificate_m``.
+``safety_margin_m``.
 """
 
 from typing import Any

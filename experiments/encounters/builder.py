@@ -30,7 +30,7 @@ class SceneBuilder:
 
     Args:
         own: platform of the own boats.
-        other: platform of the others (and of the second team-mate, where a family has only team-mates).
+        other: platform of the others (and of the second teammate, where a family has only teammates).
         conditions: the radius decides how far apart boats start.
         seed: of the run.
         family: name of the family.

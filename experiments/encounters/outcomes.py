@@ -4,7 +4,7 @@
 scenes played *without* a guard, every `EVERY_S` from the first decision on, of the variant that is the worst without a
 guard: the same states for every guard. A sample is an own boat in such a state, with the command it wants there. It is
 *safe* when the value table of each pair it is in says that the separation can still be kept: from an opponent that does
-its worst for ever, with the help of a team-mate. No guard has a say in that. The guard is asked about every state
+its worst for ever, with the help of a teammate. No guard has a say in that. The guard is asked about every state
 afresh, with nothing remembered; the boat is left alone when its command passes bit for bit.
 """
 
@@ -55,13 +55,13 @@ NO_VERDICT: dict[str, float] = dict.fromkeys(COUNTS, 0.0) | {"last_preventable_s
 
 @kernel
 def pair_columns(state: Array, team: IntArray, radius_m: float, out: Array) -> None:
-    """Entries into the radius and least distance, of team-mates and of own boats with others.
+    """Entries into the radius and least distance, of teammates and of own boats with others.
 
     Args:
         state: (T+1, B, n, N_STATE).
         team: (n,).
         radius_m: at exactly this distance is inside; the start does not count.
-        out: (B, 4) entries and least distance m of team-mates, then of opponents; written.
+        out: (B, 4) entries and least distance m of teammates, then of opponents; written.
     """
     for b in range(state.shape[1]):
         out[b, 0] = out[b, 2] = 0.0
@@ -159,7 +159,7 @@ def _outside_m(played: Trajectory) -> Array:
 def never_arrived(played: Trajectory, bare: Trajectory) -> Array:
     """Share (B,) of own boats that had not reached their first goal by the end, and did without a guard.
 
-    A livelock of team-mates is safe, and nobody stands still in it: this shows it. A boat that cannot get there in time
+    A livelock of teammates is safe, and nobody stands still in it: this shows it. A boat that cannot get there in time
     even alone says nothing about the guard: it counts as one that arrived.
     """
     own = played.scenes.own
@@ -181,14 +181,14 @@ def start_certificate_m(played: Trajectory) -> np.ndarray:
     shield = build_guard(SHIELD, scenes, played.conditions)
     ours = np.broadcast_to(scenes.own, played.state.shape[1:3]).copy()
     shield.decide(scenes.state, played.nominal[0], ours)
-    return np.asarray(shield.certificate_m[:, scenes.own].min(axis=1))
+    return np.asarray(shield.safety_margin_m[:, scenes.own].min(axis=1))
 
 
 def safe_boats(scenes: Scenes, state: Array, conditions: Conditions) -> BoolArray:
     """Own boats (B, n) in states (B, n, N_STATE) from which the separation can be kept; none without tables."""
     safe = np.zeros(state.shape[:2], np.bool_)
     config = ShieldConfig.of(
-        separation_m=conditions.radius_m, position_error_m=conditions.noise_m, dt_s=DT_S, adversary_s=math.inf
+        separation_m=conditions.radius_m, position_error_m=conditions.noise_m, dt_s=DT_S, adversary_horizon_s=math.inf
     )
     try:
         judge = ReachGuard(config, 1, scenes.platforms, tuple(scenes.team.tolist()))
@@ -226,7 +226,7 @@ def inactive_columns(bare: Trajectory, guard: str | GuardMaker, conditions: Cond
 def judge_game(played: Trajectory, game: int) -> dict[str, float]:
     """Judge the breaches of the own boats in a game, the first `MOST_JUDGED` of them.
 
-    A breach is avoidable when any own boat in it could have avoided it; of team-mates either may.
+    A breach is avoidable when any own boat in it could have avoided it; of teammates either may.
 
     Returns:
         How many are ``avoidable``, ``unavoidable``, ``started_inside`` and ``not_judged``; and of the breach that

@@ -87,7 +87,7 @@ def record_of(played: Trajectory, game: int, title: str, guarded: bool, water: W
         sent=filtered,
         reason=np.where(own, played.reason[:, game], NOT_COVERED).astype(np.uint8),
         intervened=own & changed,
-        certificate_m=np.where(own & np.isfinite(margin_m), margin_m, np.nan),
+        safety_margin_m=np.where(own & np.isfinite(margin_m), margin_m, np.nan),
         breaches=found[scenes.own[found[:, 1:3].astype(np.int64)].any(axis=1)],
     )
 

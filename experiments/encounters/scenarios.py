@@ -117,7 +117,7 @@ def sudden_turn(build: SceneBuilder) -> None:
 
 
 def converging(build: SceneBuilder, boats: int) -> None:
-    """Team-mates whose straight ways cross at one place at about the same time; mixed fleets alternate platforms."""
+    """Teammates whose straight ways cross at one place at about the same time; mixed fleets alternate platforms."""
     first, names = build.uniform(-180.0, 180.0), (build.own, build.other)
     lead_s = build.uniform(5.0, 12.0) * (1.0 if build.scale < 1.5 else 1.4)
     spread = build.uniform(20.0, 180.0) if boats == 2 else 360.0 / boats
@@ -131,7 +131,7 @@ def converging(build: SceneBuilder, boats: int) -> None:
 
 
 def circle(build: SceneBuilder, boats: int) -> None:
-    """Team-mates all round a circle, each with its goal at the opposite point: they all come to the middle at once.
+    """Teammates all round a circle, each with its goal at the opposite point: they all come to the middle at once.
 
     Two that turned away there may end up side by side, each wanting to turn to where the other is. In mixed fleets
     platforms alternate, and each starts as far out as its speed calls for.
@@ -308,7 +308,7 @@ class Family:
 
 
 _LEFT = "The other comes from the left to the place where the own boat will be, give or take a second or two."
-_ROUND = "team-mates all round a circle, each on its way to the opposite point."
+_ROUND = "teammates all round a circle, each on its way to the opposite point."
 FAMILIES: dict[str, Family] = {
     family.name: family
     for family in (
@@ -316,8 +316,8 @@ FAMILIES: dict[str, Family] = {
         Family("crossing_left", 1, crossing, (1.0,), sentence=_LEFT),
         Family("crossing_right", 1, crossing, (-1.0,), sentence="The other comes from the right."),
         Family("overtaking", 1, overtaking),
-        Family("converging_2", 0, converging, (2,), sentence="Two team-mates."),
-        Family("converging_3", 0, converging, (3,), sentence="Three team-mates."),
+        Family("converging_2", 0, converging, (2,), sentence="Two teammates."),
+        Family("converging_3", 0, converging, (3,), sentence="Three teammates."),
         Family("circle_3", 0, circle, (3,), lasts=2.0, sentence=f"Three {_ROUND}"),
         Family("circle_6", 0, circle, (6,), lasts=2.0, sentence=f"Six {_ROUND}"),
         Family("doorway", 2, doorway, field_for=4),
@@ -332,7 +332,7 @@ FAMILIES: dict[str, Family] = {
         Family("crowd_6", 3, crowd, (3, 3), 6, sentence="Three against three."),
         Family("crowd_12", 6, crowd, (6, 6), 12, sentence="Six against six."),
         Family("crowd_40", 20, crowd, (20, 20), 40, sentence="Twenty against twenty."),
-        Family("crowd_40_own", 0, crowd, (40, 0), 40, sentence="Forty team-mates."),
+        Family("crowd_40_own", 0, crowd, (40, 0), 40, sentence="Forty teammates."),
         Family("pursued_along_edge", 1, pursued_along_edge, (), 2, 2.7),
         Family("pursued_into_corner", 1, pursued_into_corner, (), 2, 2.7),
         Family("chased_in_box", 1, chased, (1,), 2, 2.7, "One pursuer chases a boat about its field."),

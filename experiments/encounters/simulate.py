@@ -260,7 +260,7 @@ def play(scenes: Scenes, guard: str | GuardMaker | Guard, conditions: Conditions
         if not np.isfinite(filtered).all():
             b, i, _ = np.argwhere(~np.isfinite(filtered))[0]
             raise FleetError(f"step {step}: the command for boat {i} of game {b} is not finite: {filtered[b, i]}")
-        played.reason[step], played.safety_margin_m[step] = safety_filter.reason, safety_filter.certificate_m
+        played.reason[step], played.safety_margin_m[step] = safety_filter.reason, safety_filter.safety_margin_m
         move(world, filtered, step)
         played.state[step + 1] = world.state
     return played

@@ -26,7 +26,7 @@ PAGE, ZIP = "entry.html", "shielded.zip"
 LOOKED = "a game, every step looked at"
 TILES = (
     ("opponents", "hits with opponents", LOOKED),
-    ("teammates", "hits with team-mates", LOOKED),
+    ("teammates", "hits with teammates", LOOKED),
     ("collisions", "counted by the game", "a game, once a decision"),
     ("captures", "captures", "a game"),
     ("net", "net of captures", "made less given up, a game"),

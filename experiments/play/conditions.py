@@ -96,7 +96,7 @@ def words_of(values: Mapping[str, Any]) -> str:
 
 
 def words_of_settings(shield: Mapping[str, Any]) -> str:
-    """Write the settings that a shield was given: ``separation_m 4, response_per_s inf``; empty without any."""
+    """Write the settings that a shield was given: ``separation_m 4, cbf_rate_per_s inf``; empty without any."""
     lists = {name: "+".join(value) for name, value in shield.items() if isinstance(value, (list, tuple))}
     return ", ".join(f"{name} {value}" for name, value in {**shield, **lists}.items())
 

@@ -163,13 +163,13 @@ class Match:
         if self.env.renderer is not None:
             from steerclear.env.render import Overlay  # draws with pygame: only where there is a window
 
-            self.env.renderer.overlay = Overlay(*commands, seen.reason, seen.intervened, seen.certificate_m)
+            self.env.renderer.overlay = Overlay(*commands, seen.reason, seen.intervened, seen.safety_margin_m)
 
     def _record_step(self) -> None:
         if self._moment is None or self._recorder is None:
             raise SteerclearError("the game moved without asking for commands; build the Match anew")
         wanted, sent, seen = self._moment
-        self._recorder.step(wanted, sent, seen.reason, seen.intervened, seen.certificate_m)
+        self._recorder.step(wanted, sent, seen.reason, seen.intervened, seen.safety_margin_m)
         self._driven.append(self.env.core.driven[0].copy())
         if self._log is not None:
             self._log.step(self.env.core)

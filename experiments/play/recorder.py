@@ -52,7 +52,7 @@ def _sees_the_game(policy: Any) -> bool:
 FIRST_ROWS = 1024
 """Rows there is room for at first; when they are full, for twice as many."""
 MARKS = ("has_flag", "is_tagged", "oob", "is_disabled", "flag_position", "captures")
-ORDERS = ("wanted", "sent", "reason", "intervened", "certificate_m")
+ORDERS = ("wanted", "sent", "reason", "intervened", "safety_margin_m")
 Rows = NDArray[Any]
 
 
@@ -74,7 +74,7 @@ class Recorder:
         }
         self._note_state(0)
 
-    def step(self, wanted: Rows, sent: Rows, reason: Rows, intervened: Rows, certificate_m: Rows) -> None:
+    def step(self, wanted: Rows, sent: Rows, reason: Rows, intervened: Rows, safety_margin_m: Rows) -> None:
         """Add a step; the state after it is taken from the game.
 
         Args:
@@ -82,12 +82,12 @@ class Recorder:
             sent: (n, 2) likewise, what the boats were told.
             reason: (n,) reason codes.
             intervened: (n,) bool.
-            certificate_m: (n,) certificate values, m.
+            safety_margin_m: (n,) certificate values, m.
         """
         step = self._steps
         if step + 2 > len(self._rows["wanted"]):
             self._rows = {name: np.concatenate([rows, np.zeros_like(rows)]) for name, rows in self._rows.items()}
-        for name, row in zip(ORDERS, (wanted, sent, reason, intervened, certificate_m), strict=True):
+        for name, row in zip(ORDERS, (wanted, sent, reason, intervened, safety_margin_m), strict=True):
             self._rows[name][step] = row
         self._note_state(step + 1)
         self._steps = step + 1

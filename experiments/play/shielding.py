@@ -34,7 +34,7 @@ class Seen:
 
     reason: NDArray[np.uint8]
     intervened: NDArray[np.bool_]
-    certificate_m: NDArray[np.float32]
+    safety_margin_m: NDArray[np.float32]
     solve_time_s: float | None
 
 
@@ -107,10 +107,10 @@ class Shielding:
             own = decisions.reason != NOT_COVERED
             seen.reason[own] = decisions.reason[own]
             seen.intervened[own] = decisions.intervened[own]
-            margin_m = decisions.certificate_m[own]
-            seen.certificate_m[own] = np.where(margin_m < NOBODY_NEAR_M, margin_m, np.nan)
+            margin_m = decisions.safety_margin_m[own]
+            seen.safety_margin_m[own] = np.where(margin_m < NOBODY_NEAR_M, margin_m, np.nan)
             times_s.append(decisions.solve_time_s)
-        return Seen(seen.reason, seen.intervened, seen.certificate_m, max(times_s, default=None))
+        return Seen(seen.reason, seen.intervened, seen.safety_margin_m, max(times_s, default=None))
 
 
 def shield_game(env: MctfEnv, spec: MatchSpec) -> Shielding:

@@ -37,7 +37,7 @@ pursuers are strategies, the table's opponent is the worst that its grid and hor
 A set much larger than the table's costs freedom, one that misses positions costs the promise. The goals are
 {RATIO_GOAL:g} times the area and {MISSED_PERCENT_GOAL:g} % missed, in every row."""
 LOOKED_UP = """The shield looks opponents up in this very table, so its set is the table's at a margin: the ratio is
-what the margin costs, and that nothing is missed says nothing. `--shield-set certificate=turning_circle` compares
+what the margin costs, and that nothing is missed says nothing. `--shield-set opponent_model=turning_circle` compares
 manoeuvres instead."""
 PLAYED_HEADS = ("own/other", "heading", "reach, m²", "lost, m²", "ratio", "by table", "played", "lost beyond")
 PLAYED_WORDS = f"""Found by playing, to the radius, where [unsafe_sets.md](unsafe_sets.md) tells what the shield

@@ -152,7 +152,7 @@ def _config(radius_m: float, settings: Mapping[str, Any], refused: Mapping[str, 
     for name, remedy in refused.items():
         if name in settings:
             raise ConfigError(f"{name} cannot be set here: {remedy}")
-    return ShieldConfig.of(**{"separation_m": radius_m, "profile": "rammers", **given, **settings})
+    return ShieldConfig.of(**{"separation_m": radius_m, "profile": "ramming", **given, **settings})
 
 
 def _all_round(values: ValueTable, place: Place, edges: Array, bearings_rad: Array) -> tuple[Array, Array]:
@@ -225,7 +225,7 @@ def certificates_m(state: Array, names: tuple[str, str], config: ShieldConfig) -
     wanted = np.zeros((len(state), 2, 2))
     wanted[:, :, 0] = get_platform(names[0]).max_speed_mps
     shield.decide(state, wanted, np.tile([True, False], (len(state), 1)))
-    return np.asarray(shield.certificate_m[:, 0])
+    return np.asarray(shield.safety_margin_m[:, 0])
 
 
 def played_experiment(own: str, other: str, radius_m: float, settings: Mapping[str, Any]) -> Experiment:

@@ -1,7 +1,7 @@
 """Meo-Indep: man-to-man defence.
 
 The paper: the intercept points of every pair of defender and attacker are computed, pairs are chosen for the least
-total distance, each boat drives to its point at full speed and stops there; where paths of team-mates cross, one
+total distance, each boat drives to its point at full speed and stops there; where paths of teammates cross, one
 heading is turned to the opposite. Filled in: an intercept point is where the defender at full speed meets the attacker
 going on as it does, moved into the own half; of two boats whose paths cross the later one is turned.
 """

@@ -53,7 +53,7 @@ def _point_of_loop(game: Game, boat: int, goal: int) -> tuple[float, float]:
 def field_attack(game: Game, boat: int, reach_m: float, shares_flag: bool) -> tuple[float, float]:
     """Drawn to the flag (with it: to where captures are made), pushed off opponents and near walls, at full speed.
 
-    ``shares_flag``: a team-mate's carrying the flag also sends this boat home.
+    ``shares_flag``: a teammate's carrying the flag also sends this boat home.
     """
     team = game.team[boat]
     push_right, push_forward = push(game, boat, reach_m)

@@ -12,7 +12,7 @@ from ..jit import lean_kernel
 from ..workspace import Scene
 
 NOTHING, BOATS, OBSTACLES, OPPONENTS, ALL = range(5)
-"""What is kept, each with all before it: clear of team-mates and of opponents that hold their course; of obstacles near
+"""What is kept, each with all before it: clear of teammates and of opponents that hold their course; of obstacles near
 in time; what must be kept from all boats, whatever they are granted; what must be kept from static constraints."""
 
 SPARE_WORTH = 1e-3
@@ -75,7 +75,7 @@ def _ask_no_pursuers(slot: int, scene: Scene) -> None:
 def rank_path(i: int, slot: int, best: Rank, scene: Scene) -> Rank:
     """Rank of the path in ``slot`` for boat i; work is cut short once it cannot exceed ``best``.
 
-    What is certain comes before what is feared: team-mates and opponents that hold their course first, obstacles near
+    What is certain comes before what is feared: teammates and opponents that hold their course first, obstacles near
     in time second (who is stopped is caught), pursuing opponents third; then all static constraints, and last room to
     spare. The clearance told is from all boats, whatever the rank hangs on.
     """

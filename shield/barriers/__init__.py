@@ -4,7 +4,7 @@ Each is asked about the path of a manoeuvre. `pursuit` and `value_function` tell
 row (`clearance`): the margin h, m, the sample of the path where it is least, and dh/dx, dh/dy there (`registered` only
 where the program asks). `filter.qp` makes of `boats` and `static` the slopes by the commands of this step.
 
-    boats             team-mates on their manoeuvres, opponents that hold their course
+    boats             teammates on their manoeuvres, opponents that hold their course
     pursuit           the worst opponent that pursues
     value_function    the same, looked up in a value table
     static            the worst of all that stays, and of registered barriers, over a path: each is a number with a

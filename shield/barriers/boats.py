@@ -1,4 +1,4 @@
-"""Distance kept from boats whose way is known: team-mates on their backups, opponents that hold their course.
+"""Distance kept from boats whose way is known: teammates on their backups, opponents that hold their course.
 
 For boat i with backup manoeuvre m (turn to one side, then straight, at a set speed),
 
@@ -45,7 +45,7 @@ def clear_of_boat(i: int, j: int, path: Array, scene: Scene, floor_m: float, cap
     """
     state, ours, boats, tuning = scene.state, scene.ours, scene.boats, scene.tuning
     search = closing(i, j, scene), scene.radius[i, j], floor_m, cap_m
-    tail, samples = tuning.tail_s / boats.sample_s, boats.samples[i]
+    tail, samples = tuning.straight_horizon_s / boats.sample_s, boats.samples[i]
     course, way = scene.course[j], state[j, L.SPEED] * boats.sample_s
     if ours[j] or scene.known[j]:
         samples = min(samples, boats.samples[j])
@@ -63,7 +63,7 @@ def must_keep(i: int, j: int, scene: Scene) -> float:
 
 @lean_kernel
 def worst_clearance(i: int, slot: int, scene: Scene, floor_m: float) -> None:
-    """Worst clearance of boat i on the path in ``slot`` from team-mates' paths and opponents' straight courses.
+    """Worst clearance of boat i on the path in ``slot`` from teammates' paths and opponents' straight courses.
 
     ``scene.short[slot]`` says whether one of them is below what must be kept; then the one that is so by most binds,
     of margins below 0 the least.

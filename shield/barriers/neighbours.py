@@ -66,7 +66,7 @@ def _note_pair(i: int, j: int, scene: Scene) -> None:
     radius = tuning.radius_m + scene.error_m[i] + scene.error_m[j]
     dx, dy = state[i, L.X] - state[j, L.X], state[i, L.Y] - state[j, L.Y]
     square = dx * dx + dy * dy
-    reach = radius + top * ((samples + 1) * boats.sample_s + tuning.tail_s)
+    reach = radius + top * ((samples + 1) * boats.sample_s + tuning.straight_horizon_s)
     near = square <= reach * reach
     scene.near[i, j], scene.near[j, i] = near, near
     if not near:

@@ -296,7 +296,7 @@ def _falls_short(i: int, slot: int, scene: Scene) -> bool:
 def worst_pursuer(i: int, slot: int, level_m: float, scene: Scene) -> None:
     """Clearance from each pursuer, in ``scene.threats_m[slot]``; that in ``slot`` is lowered where it is worse.
 
-    What is known in full of a path is not asked again: it hangs on no team-mate's manoeuvre, nor on the targets.
+    What is known in full of a path is not asked again: it hangs on no teammate's manoeuvre, nor on the targets.
 
     Of one that is short of its target (``scene.fails``) and below the level nothing more is to be known: the search
     stops. Who came there last is looked at first, so that of many manoeuvres those that fail cost little.

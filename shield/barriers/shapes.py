@@ -18,8 +18,8 @@ def to_circle(x: float, y: float, circle: Array) -> tuple[float, float, float]:
 
 
 @lean_kernel
-def to_wall(x: float, y: float, wall: Array, hull_m: float) -> tuple[float, float, float]:
-    """Distance, m, from what is within ``hull_m`` of a wall, and its slope, the unit vector away from it."""
+def to_wall(x: float, y: float, wall: Array, obstacle_clearance_m: float) -> tuple[float, float, float]:
+    """Distance, m, from what is within the clearance of a wall, and its gradient, the unit vector away from it."""
     dx, dy = wall[2] - wall[0], wall[3] - wall[1]
     length = dx * dx + dy * dy
     part = 0.0
@@ -28,8 +28,8 @@ def to_wall(x: float, y: float, wall: Array, hull_m: float) -> tuple[float, floa
     rx, ry = x - wall[0] - part * dx, y - wall[1] - part * dy
     distance = math.sqrt(rx * rx + ry * ry)
     if distance <= 1e-9:
-        return -hull_m, 1.0, 0.0
-    return distance - hull_m, rx / distance, ry / distance
+        return -obstacle_clearance_m, 1.0, 0.0
+    return distance - obstacle_clearance_m, rx / distance, ry / distance
 
 
 @lean_kernel

@@ -136,19 +136,19 @@ def _clearance(
     With ``grace`` below 1 it has to come away as well: what it is short of now is excused less from sample to sample.
     Going through a wall is not excused, unless it is not known which side of it the boat is on.
     """
-    drift_m, hull_m, wall = sampling.drift_m, static.segment_m, o - static.circles.shape[0]
+    drift_m, obstacle_clearance_m, wall = sampling.drift_m, static.segment_m, o - static.circles.shape[0]
     is_wall, moves = 0 <= wall < static.segments.shape[0], registered_number(o, static) >= 0
     excused = min(0.0, now_m)
     fall_m = sampling.way_m + drift_m - excused * (1.0 - sampling.grace)
-    known = now_m + hull_m >= static.side_m
+    known = now_m + obstacle_clearance_m >= static.side_m
     lowered, behind, x, y, k = False, False, here[0], here[1], 0
     while k <= last:
         margin, nx, ny = margin_at(o, path[k, 0], path[k, 1], sampling.first_s + k * sampling.sample_s, static)
-        near_m = margin + hull_m if is_wall else FAR  # a wall farther off is not gone through
+        near_m = margin + obstacle_clearance_m if is_wall else FAR  # a wall farther off is not gone through
         if is_wall and known and goes_through(x, y, path[k, 0], path[k, 1], static.segments[wall]):
             behind = not behind
         if behind:
-            margin, nx, ny = -near_m - hull_m - k * drift_m, -nx, -ny
+            margin, nx, ny = -near_m - obstacle_clearance_m - k * drift_m, -nx, -ny
         else:
             margin -= excused * sampling.grace**k + k * drift_m
         lowered = lowered or margin < out[MARGIN]

@@ -77,7 +77,7 @@ class CommandPipeline:
             answer: the policy's absolute commands, all boats of the file; used for boats without a response due.
             verdict: responses due, boats whose state is unknown, boats that do not obey.
             surroundings: static constraints now.
-            mates: team-mates another process commands behind a shield of their own.
+            mates: teammates another process commands behind a shield of their own.
         """
         commanded = [name for name in self._links if name not in verdict.unknown and name not in verdict.idle]
         so_far = Steered()
@@ -115,7 +115,7 @@ class CommandPipeline:
                 else:
                     response = "stop" if response == "go_on" else response
                     values[i] = self._responders[name].wanted(response, fleet.state[i])
-            elif fleet.controlled[i]:  # a team-mate with its own shield: taken to hold its course
+            elif fleet.controlled[i]:  # a teammate with its own shield: taken to hold its course
                 values[i] = max(0.0, fleet.state[i, L.SPEED]), math.radians(fleet.state[i, L.HEADING]) % TWO_PI
         return Commands.absolute_rad(values)
 
@@ -130,7 +130,7 @@ class CommandPipeline:
                 text = f"{name} is {outside_m:.1f} m outside, beyond the hard line: stopped by its link, handed over"
             actions.append(Action(name, what, "stop", text))
             return self._links[name].stop()
-        speed, heading = decisions.sent.absolute(i, fleet.heading_rad[i])
+        speed, heading = decisions.filtered.absolute(i, fleet.heading_rad[i])
         try:
             return self._links[name].send(heading, speed)
         except BridgeError as error:

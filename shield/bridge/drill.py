@@ -141,7 +141,7 @@ class Drill:
         speed, heading = self._commands.values[self._fleet.names.index(boat)]
         if tick.decisions is not None and tick.fleet is not None and boat in tick.fleet.names:
             i = tick.fleet.names.index(boat)
-            decided = tick.decisions.sent.absolute(i, tick.fleet.heading_rad[i])
+            decided = tick.decisions.filtered.absolute(i, tick.fleet.heading_rad[i])
         else:
             decided = told[1], told[0]
         turned = abs((decided[1] - heading + math.pi) % (2.0 * math.pi) - math.pi)

@@ -217,7 +217,11 @@ class Failsafe:
             decided = self._seen.decided
             if decided is not None and boat in decided.fleet.names:
                 last = decided[decided.fleet.names.index(boat)]
-                why = f": it keeps clear of {', '.join(last.binding)}" if last.intervened and last.binding else ""
+                why = (
+                    f": it keeps clear of {', '.join(last.active_constraints)}"
+                    if last.intervened and last.active_constraints
+                    else ""
+                )
             self._due(
                 "geofence", boat, f"{boat} is {outside_m:.1f} m outside the geofence, for {since_s:.0f} s{why}", (boat,)
             )

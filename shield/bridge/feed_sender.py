@@ -111,7 +111,7 @@ class FeedSender:
 
 
 class PositionPublisher:
-    """A sink that tells others where our boats are: team-mates' runners, the other team's, the referee.
+    """A sink that tells others where our boats are: teammates' runners, the other team's, the referee.
 
     Args:
         sender: sends them.

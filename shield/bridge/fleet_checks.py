@@ -65,7 +65,7 @@ def platform_of(fleet: FleetSettings, name: str) -> Platform:
 def shield_config(fleet: FleetSettings) -> ShieldConfig:
     """Settings of the shield with this file's step, coordination and ages.
 
-    Margins from team-mates shrink no faster than those from others where the file does not say otherwise: hulls on
+    Margins from teammates shrink no faster than those from others where the file does not say otherwise: hulls on
     water, links and clocks do what is known of them only roughly. Opponents are taken for rammers, likewise.
 
     Raises:
@@ -81,9 +81,9 @@ def shield_config(fleet: FleetSettings) -> ShieldConfig:
     _hard_line(fleet, settings)
     oldest = max(fleet.limits.contact.lost_after_s, fleet.limits.navigation.lost_after_s)
     settings.setdefault("max_track_age_s", oldest + dt_s)
-    if settings.get("adversary_s") is None:  # a real hull is at stake, and nobody knows who is out there
-        settings.setdefault("profile", "rammers")
-    settings.setdefault("mate_cap_m", settings.get("margin_cap_m", ShieldConfig.margin_cap_m))
+    if settings.get("adversary_horizon_s") is None:  # a real hull is at stake, and nobody knows who is out there
+        settings.setdefault("profile", "ramming")
+    settings.setdefault("teammate_margin_cap_m", settings.get("margin_cap_m", ShieldConfig.margin_cap_m))
     if settings.get("barriers"):
         raise FleetFileError("shield.barriers: what they are given is not in the black box; leave them out on boats")
     try:

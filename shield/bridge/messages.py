@@ -230,7 +230,7 @@ def check_finite(boat: str, heading_rad: float, speed_mps: float) -> None:
 
 @dataclass(frozen=True)
 class Contact:
-    """The latest fix of one boat seen from outside: an opponent, or a team-mate without a link of ours.
+    """The latest fix of one boat seen from outside: an opponent, or a teammate without a link of ours.
 
     Attributes:
         boat: its name.

@@ -220,14 +220,14 @@ def check_certificate(fleet: FleetFile, tracker: Tracker, obstacles: StaticObsta
     own = np.flatnonzero(given.controlled)
     if len(own) == 0:
         return CheckResult("certificate", False, "no boat of ours seen; check telemetry")
-    worst = int(own[np.argmin(answer.certificate_m[own])])
-    margin = float(answer.certificate_m[worst])
+    worst = int(own[np.argmin(answer.safety_margin_m[own])])
+    margin = float(answer.safety_margin_m[worst])
     others = np.delete(given.position_m, worst, axis=0)
     nearest_m = np.hypot(*(others - given.position_m[worst]).T).min(initial=math.inf)
-    figures = {"certificate_m": margin, "nearest_m": float(nearest_m)}
+    figures = {"safety_margin_m": margin, "nearest_m": float(nearest_m)}
     name = given.names[worst]
     if not margin >= 0.0:
-        near = ", ".join(answer[worst].binding) or "the others"
+        near = ", ".join(answer[worst].active_constraints) or "the others"
         text = f"{name} has a margin of {margin:.2f} m beyond the separation; move it away from {near}"
         return CheckResult("certificate", False, text, figures)
     text = "nobody near" if margin > NEAR_MARGIN_M else f"least margin {margin:.2f} m ({name})"

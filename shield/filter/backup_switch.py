@@ -1,7 +1,7 @@
-"""Where the wanted commands do not keep everything: the backups, a joint plan for all boats of ours.
+"""Where the nominal commands do not keep everything: the backups, a joint plan for all boats of ours.
 
 A command is sent only with a verified joint plan behind it: a manoeuvre for every boat of ours that keeps clear of
-everything from the state one step after it. When the wanted commands have none, the plan of the last decision is gone
+everything from the state one step after it. When the nominal commands have none, the plan of the last decision is gone
 on with, or a better one. So a verified plan, once there, is there at every step, unless an opponent does what none was
 asked to keep clear of.
 
@@ -35,7 +35,7 @@ from .nominal import check
 
 @lean_kernel
 def pick_movers(scene: Scene) -> int:
-    """Boats whose certificate fails, and the team-mates it fails against; once in, a boat stays in."""
+    """Boats whose certificate fails, and the teammates it fails against; once in, a boat stays in."""
     ours = scene.ours
     n = ours.shape[0]
     for i in range(n):
@@ -84,7 +84,7 @@ def set_off(i: int, scene: Scene) -> None:
 
 @lean_kernel
 def _could_keep(i: int, slot: int, scene: Scene) -> Rank:
-    """Rank of boat i's path in ``slot`` if team-mates whose wanted commands passed were not there."""
+    """Rank of boat i's path in ``slot`` if teammates whose nominal commands passed were not there."""
     ours = scene.ours
     for j in range(ours.shape[0]):
         if ours[j] and not scene.moving[j]:
@@ -98,7 +98,7 @@ def _could_keep(i: int, slot: int, scene: Scene) -> Rank:
 
 @lean_kernel
 def _passed_are_in_the_way(count: int, scene: Scene) -> bool:
-    """Whether some mover would keep more if team-mates whose wanted commands passed were not there.
+    """Whether some mover would keep more if teammates whose nominal commands passed were not there.
 
     A boat that opponents or static constraints leave no way out is helped by nobody who gives up what was wanted.
     """
@@ -167,7 +167,7 @@ def _find_backups(count: int, scene: Scene) -> None:
     """Make the candidate of all movers' backups and check it.
 
     All boats of ours had backups that fit at the last decision, and these are tried first. Those of the movers need not
-    fit what boats have whose wanted commands passed: where these are in the way, or are themselves too near them, they
+    fit what boats have whose nominal commands passed: where these are in the way, or are themselves too near them, they
     take part, too.
     """
     ours = scene.ours

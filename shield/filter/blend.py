@@ -1,6 +1,6 @@
 """What the backups come to, verified by the full model, and what an answer may cost of that.
 
-Backups are a joint plan, see `backup_switch`. From it on what is nearer to the wanted commands is taken, an answer of
+Backups are a joint plan, see `backup_switch`. From it on what is nearer to the nominal commands is taken, an answer of
 the program or a part of a backup, if no boat then keeps less than after its backup. Who uses up its margin to give way
 as little as may be gives way for longer.
 """
@@ -155,9 +155,9 @@ def any_may_be_blended(scene: Scene) -> bool:
 def blend(scene: Scene) -> None:
     """Take back of backups, boat by boat, what is not needed to keep what they keep.
 
-    Margins from boats are those that have to be kept, as when the wanted commands were screened; backups that do not
+    Margins from boats are those that have to be kept, as when the nominal commands were screened; backups that do not
     keep them are carried out as they are. Of static constraints only their distance is asked for, but of boats between
-    these and team-mates: who uses up its room there has none left to make for others.
+    these and teammates: who uses up its room there has none left to make for others.
     """
     for i in range(scene.ours.shape[0]):
         if _may_be_blended(i, scene) and keeps_all(i, scene) and not all_spent(scene):

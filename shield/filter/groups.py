@@ -1,7 +1,7 @@
 """Groups of boats of ours that can matter to each other: what is not passed is decided group by group.
 
 Two boats are of one group if they could meet, or both could meet boats of it (`barriers.neighbours`). A decision for
-one group does not hang on others: what befalls a team-mate far away changes nothing, and many boats are many small
+one group does not hang on others: what befalls a teammate far away changes nothing, and many boats are many small
 problems.
 """
 
@@ -12,7 +12,7 @@ from ..jit import lean_kernel
 from ..workspace import Scene
 
 NOT_OURS, NONE, NOT_YET = -1, -2, -3
-"""Boats of no group: not ours; of those whose wanted commands keep everything; not looked at yet."""
+"""Boats of no group: not ours; of those whose nominal commands keep everything; not looked at yet."""
 
 
 @lean_kernel
@@ -37,7 +37,7 @@ def _gather(first: int, group: int, scene: Scene) -> bool:
 
 @lean_kernel
 def make_groups(scene: Scene) -> int:
-    """Number, in ``scene.group``, the groups in which a wanted command is short of something; returns how many."""
+    """Number, in ``scene.group``, the groups in which a nominal command is short of something; returns how many."""
     ours, groups = scene.ours, scene.group
     for i in range(ours.shape[0]):
         groups[i] = NOT_YET if ours[i] else NOT_OURS

@@ -58,8 +58,8 @@ def _asked(decay: float, was_m: float, cap_m: float) -> float:
 def set_targets(scene: Scene) -> None:
     """Margins each boat must keep: the discrete-time class-K condition h(x+) >= decay * min(h(x), cap), at least 0.
 
-    What is feared of opponents has its own, of each: beside a team-mate, whose margin is small and sure, it would else
-    be let go at once. That from team-mates of ours shrinks freely until it is small: what they will do is known.
+    What is feared of opponents has its own, of each: beside a teammate, whose margin is small and sure, it would else
+    be let go at once. That from teammates of ours shrinks freely until it is small: what they will do is known.
 
     A boat that dwells on its backup gives nothing of it away: all there may be is asked for.
     """
@@ -73,7 +73,7 @@ def set_targets(scene: Scene) -> None:
         if ours[i] and memory[i, W.HAS_BACKUP] > 0.0:
             decay, cap_m = boats.decay[i], boats.cap_m[i]
             scene.target[i] = _asked(decay, memory[i, W.BACKUP_MARGIN], cap_m)
-            scene.mate_target_m[i] = _asked(decay, memory[i, W.BACKUP_MARGIN], min(tuning.mate_cap_m, cap_m))
+            scene.mate_target_m[i] = _asked(decay, memory[i, W.BACKUP_MARGIN], min(tuning.teammate_margin_cap_m, cap_m))
             scene.joint_target_m[i] = _asked(boats.joint_decay, memory[i, W.JOINT_MARGIN], cap_m)
             scene.static_target_m[i] = _asked(tuning.static_decay, memory[i, W.STATIC_MARGIN], tuning.margin_cap_m)
             for j in range(ours.shape[0]):
@@ -84,7 +84,7 @@ def set_targets(scene: Scene) -> None:
 
 @lean_kernel
 def screen(scene: Scene) -> bool:
-    """Check the wanted commands as they are; True when every boat still has its backup after them.
+    """Check the nominal commands as they are; True when every boat still has its backup after them.
 
     An unusable command (NaN, infinite or beyond `LARGEST_COMMAND`), or one of a boat of whose place a registered
     barrier tells nothing, is replaced by holding course at zero speed before the check.

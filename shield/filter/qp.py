@@ -1,4 +1,4 @@
-"""The quadratic program between team-mates: the least change that leaves every boat what its backup satisfies.
+"""The quadratic program between teammates: the least change that leaves every boat what its backup satisfies.
 
     minimise 1/2 |z - z0|^2   subject to   C z >= d
 
@@ -14,7 +14,7 @@ is what the class-K rate asks for, or what the backups keep if that is more:
 
     h + dh/dpsi_i (psi_i - psi_i') + dh/dv_i (v_i - v_i') >= target,
 
-less the same terms of a team-mate j, for whom n points the other way. Least changes are for those who decide with us,
+less the same terms of a teammate j, for whom n points the other way. Least changes are for those who decide with us,
 and whom no opponent is in the way of; see `backup_switch`. The answer counts if the exact check says so.
 """
 
@@ -250,7 +250,7 @@ def solve(count: int, rows: int, scene: Scene) -> bool:
 
 @lean_kernel
 def among_mates(scene: Scene) -> bool:
-    """Whether team-mates are in the way of any nominal command."""
+    """Whether teammates are in the way of any nominal command."""
     found = False
     for i in range(scene.ours.shape[0]):
         found = found or (scene.ours[i] and scene.cause[i] >= 0 and scene.ours[scene.cause[i]])
@@ -259,7 +259,7 @@ def among_mates(scene: Scene) -> bool:
 
 @lean_kernel
 def begin_program(scene: Scene) -> int:
-    """Make nominal commands the candidate of boats that team-mates are in the way of, and of these; returns how many.
+    """Make nominal commands the candidate of boats that teammates are in the way of, and of these; returns how many.
 
     None that an opponent is in the way of, or whose backup is short of something: what these do is settled.
     """

@@ -30,7 +30,7 @@ PRESSING_DEG = 15.0
 TURNED_DEG = 20.0
 """A boat that has turned so far to the side it wants is not kept from turning."""
 FREED_S = 1.0
-"""A boat whose wanted command has passed for longer is not kept from turning, s."""
+"""A boat whose nominal command has passed for longer is not kept from turning, s."""
 AWAY_DEG = 120.0
 """Turn commanded to the boat that gives way."""
 ABREAST_M = 1.0
@@ -47,7 +47,7 @@ PATIENCE = 3.0
 
 @lean_kernel
 def _alongside(i: int, turn_deg: float, speed_mps: float, scene: Scene) -> int:
-    """Nearest team-mate alongside boat i on the side it wants to turn to; -1 for none."""
+    """Nearest teammate alongside boat i on the side it wants to turn to; -1 for none."""
     state, ours = scene.state, scene.ours
     found, least = -1, math.inf
     if speed_mps <= STILL_MPS or abs(turn_deg) <= PRESSING_DEG:
@@ -124,13 +124,13 @@ def _press(i: int, turn_deg: float, speed_mps: float, scene: Scene) -> None:
         return
     memory[i, W.PRESSED_S] += tuning.dt_s
     patience = PATIENCE if _stands_on(i, j, state) else 1.0
-    if memory[i, W.PRESSED_S] >= patience * tuning.give_way_after_s:
+    if memory[i, W.PRESSED_S] >= patience * tuning.deadlock_timeout_s:
         memory[i, W.GIVES_WAY], memory[i, W.PRESSED_S] = -math.copysign(1.0, turn_deg), tuning.dt_s
 
 
 @lean_kernel
 def apply_right_of_way(i: int, scene: Scene) -> None:
-    """Replace the wanted command of boat i where it has been kept from turning for long enough."""
+    """Replace the nominal command of boat i where it has been kept from turning for long enough."""
     tuning, memory = scene.tuning, scene.memory
     speed_mps, turn_deg = scene.command[i, 0], wrap_degrees(scene.command[i, 1])
     if memory[i, W.GIVES_WAY] != 0.0 and not _goes_on(i, turn_deg, speed_mps, scene):
@@ -139,7 +139,7 @@ def apply_right_of_way(i: int, scene: Scene) -> None:
         memory[i, W.PRESSED_S] += tuning.dt_s
     else:
         _press(i, turn_deg, speed_mps, scene)
-        if memory[i, W.GIVES_WAY] == 0.0 and memory[i, W.PRESSED_S] < tuning.give_way_after_s:
+        if memory[i, W.GIVES_WAY] == 0.0 and memory[i, W.PRESSED_S] < tuning.deadlock_timeout_s:
             return
     scene.command[i, 1] = AWAY_DEG * memory[i, W.GIVES_WAY]
     scene.reason[i] = W.RIGHT_OF_WAY

@@ -47,14 +47,14 @@ class GameFacts(NamedTuple):
         pairs = ours[:, None] & ~np.eye(len(ours), dtype=bool)
         return float((self.radius_m[:, None] + self.radius_m)[pairs].max(initial=0.0))
 
-    def hull_m(self, team: int | None = None) -> float:
+    def obstacle_clearance_m(self, team: int | None = None) -> float:
         """Largest distance at which a boat of the team hits an obstacle, m; 0 where there is none."""
         ours = np.ones(len(self.team), bool) if team is None else self.team == team
         return float(self.radius_m[ours].max(initial=0.0)) if self.obstacles else 0.0
 
     def settings(self) -> dict[str, float]:
         """Settings of a shield for this game, by name."""
-        distances = {"separation_m": self.collision_m(), "hull_m": self.hull_m()}
+        distances = {"separation_m": self.collision_m(), "obstacle_clearance_m": self.obstacle_clearance_m()}
         return {"dt_s": self.dt_s, **{name: metres for name, metres in distances.items() if metres > 0.0}}
 
 
@@ -137,7 +137,7 @@ def warn_of_distances(config: ShieldConfig, facts: GameFacts, team: int | None) 
 def _distances(facts: GameFacts, team: int | None) -> tuple[tuple[str, float, str], ...]:
     return (
         ("separation_m", facts.collision_m(team), "counts collisions"),
-        ("hull_m", facts.hull_m(team), "has boats hit its obstacles"),
+        ("obstacle_clearance_m", facts.obstacle_clearance_m(team), "has boats hit its obstacles"),
     )
 
 

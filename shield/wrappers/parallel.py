@@ -38,7 +38,7 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         keep_out: keep clear of the own flag's circle, in which the game stops boats.
         reader: what reads the game, such as sensors that err; None: the env's own state, exact.
         masks: also leave ``infos[agent]["action_mask"]``: (17,) int8, 1 for each discrete action that the shield would
-            let pass in the next step, beside team-mates that go straight on; all 1 where none does.
+            let pass in the next step, beside teammates that go straight on; all 1 where none does.
 
     Attributes:
         shield: the shield at work: the one given, or, if the game's boats collide farther apart than it keeps them and
@@ -118,7 +118,7 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         fleet = self._reader.fleet(self.team, self.shield_autopilot)
         around = self._reader.surroundings(self.team, self.keep_out)
         self.decisions = self.shield.decide(fleet, Commands.game_deg(commands), around)
-        return self.decisions.sent.values
+        return self.decisions.filtered.values
 
     def _tell(self, infos: dict[str, dict[str, Any]]) -> None:
         """Leave each covered boat's decision in its info."""

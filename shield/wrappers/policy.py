@@ -98,7 +98,7 @@ class ShieldedTeamPolicy:
         actions = self._reader.playable(actions)
         for agent in self._agent_ids:
             i = self._reader.agent_ids.index(agent)
-            sent = self.decisions.sent.values[i]
+            sent = self.decisions.filtered.values[i]
             if self.decisions.intervened[i] or (self._reader.takes_pairs_only and np.isfinite(sent).all()):
                 actions[agent] = sent.copy()
         return actions
@@ -195,7 +195,7 @@ class ShieldedCallable:
             nothing = np.full((len(fleet), 2), np.nan)
             wanted = Commands.relative_deg(nothing) if self._relative else Commands.absolute_rad(nothing)
         self.decisions = self.shield.decide(fleet, wanted)
-        return self.decisions.sent
+        return self.decisions.filtered
 
     def __repr__(self) -> str:
         return f"<shielded {getattr(self.policy, '__name__', type(self.policy).__name__)}: {words_of(self.shield)}>"

@@ -177,7 +177,7 @@ class TeamBatch:
     def action_masks(self) -> BoolArray:
         """(L, 17) which discrete actions the shield would let pass as they are, in the next game step.
 
-        Each is judged beside team-mates that go straight on; without a shield all pass, and so they do for a boat of
+        Each is judged beside teammates that go straight on; without a shield all pass, and so they do for a boat of
         which none does: then the shield decides.
 
         Raises:

@@ -191,7 +191,7 @@ def test_a_recorded_game_is_what_the_env_showed():
     np.testing.assert_array_equal(record["captures"], [view.captures for view in views])
     assert (record["reason"] == NOT_COVERED).all()
     assert not record["intervened"].any()
-    assert np.isnan(record["certificate_m"]).all()
+    assert np.isnan(record["safety_margin_m"]).all()
     assert record["breaches"].shape == (0, 4)
 
 
@@ -210,7 +210,7 @@ def test_recording_step_by_step_gives_the_same_record(game_record, game_meta):
     recorder = GameRecorder()
     recorder.start(view_of(game_record, 0), game_meta)
     for step in range(60):
-        commands = [game_record[name][step] for name in ("wanted", "sent", "reason", "intervened", "certificate_m")]
+        commands = [game_record[name][step] for name in ("wanted", "sent", "reason", "intervened", "safety_margin_m")]
         recorder.step(view_of(game_record, step + 1), *commands)
     again = recorder.finish(game_record["breaches"])
     for name in ARRAYS:

@@ -272,9 +272,9 @@ def test_the_small_version_keeps_everything_but_size():
 
 def test_settings_without_end_stay_so_in_results(tmp_path):
     """JSON has no infinity, and None would be the profile's."""
-    settings = AblationSettings(shield={"adversary_s": math.inf}, opponents=("easy",), games=0)
+    settings = AblationSettings(shield={"adversary_horizon_s": math.inf}, opponents=("easy",), games=0)
     head = execute(settings.experiment("ablate"), tmp_path).head()
-    assert json.loads(json.dumps(finite(head)))["settings"]["shield"] == {"adversary_s": "inf"}
+    assert json.loads(json.dumps(finite(head)))["settings"]["shield"] == {"adversary_horizon_s": "inf"}
 
 
 def row(game, shielded, **columns):
@@ -376,7 +376,7 @@ def test_a_goal_just_missed_does_not_look_as_if_it_were_met():
 
 
 def test_a_long_name_of_a_goal_takes_nothing_from_its_figures():
-    goal = {"name": "shield:certificate=value_table: " + "many words " * 6, "sense": "<=", "limit": 0.0}
+    goal = {"name": "shield:opponent_model=value_table: " + "many words " * 6, "sense": "<=", "limit": 0.0}
     shown = printed(goals_table([goal | {"value": 1234.0, "met": met} for met in (False, None)]), 80)
     for words in ("measured", "1,234 <= 0.00 not met", "1,234 <= 0.00 no data"):
         assert words in shown

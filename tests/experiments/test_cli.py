@@ -86,7 +86,7 @@ def test_what_is_no_number_stays_text(text):
     assert options.key_values([f"a={text}"], "--set") == {"a": text}
 
 
-@pytest.mark.parametrize("name", ["adversary_s", "table_response_per_s", "search_limit"])
+@pytest.mark.parametrize("name", ["adversary_horizon_s", "table_cbf_rate_per_s", "work_budget"])
 @pytest.mark.parametrize("text", ["inf", " Inf", "Infinity"])
 def test_a_setting_without_bound_is_given_as_inf(name, text):
     """As the page of settings has it."""
@@ -325,7 +325,7 @@ def test_parity_passes_on_a_recorded_game_and_fails_on_a_changed_one(tmp_path):
         ("ablate --opponents ,", "separated by commas"),
         ("ablate --own some/folder", "no submission at"),
         ("ablate --platform hern", "heron"),
-        ("ablate --certificate turn", "turning_circle"),
+        ("ablate --opponent-model turn", "turning_circle"),
         ("ablate --solver nosuch", "choose one of active_set, daqp"),
         ("ablate --separation -1", "separation_m is -1.0"),
         ("ablate --separation nan", "give a number"),

@@ -70,7 +70,7 @@ def folders(tmp_path):
     second = [row("easy", g, True, captures=1 + g, changed_steps=20) for g in (2, 0, 1)]
     others = [row("easy", 0, False, captures=9), row("hidden", 1, True, captures=9)]
     a = write_run(tmp_path / "a", [*first, *others], shield={"separation_m": 2.5})
-    b = write_run(tmp_path / "b", second, shield={"separation_m": 4.0, "profile": "rammers"})
+    b = write_run(tmp_path / "b", second, shield={"separation_m": 4.0, "profile": "ramming"})
     return a, b
 
 
@@ -102,7 +102,7 @@ def test_results_of_0_8_0_are_read(folders, tmp_path):
 
 def test_what_differs_is_told_and_only_that(folders):
     first, second = map(read_run, folders)
-    assert differs(first, second) == {"shield.separation_m": [2.5, 4.0], "shield.profile": [None, "rammers"]}
+    assert differs(first, second) == {"shield.separation_m": [2.5, 4.0], "shield.profile": [None, "ramming"]}
     assert differs(first, first) == {}
 
 

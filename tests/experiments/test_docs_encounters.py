@@ -181,10 +181,10 @@ def ablation(shield, changed, hits, radius="2.5"):
 
 def test_ablations_of_several_horizons_make_the_page_of_the_price(tmp_path):
     results = [
-        ablation({"profile": "rammers"}, 21.5, 0.0),
-        ablation({"adversary_s": 6.0}, 4.25, 0.5),
+        ablation({"profile": "ramming"}, 21.5, 0.0),
+        ablation({"adversary_horizon_s": 6.0}, 4.25, 0.5),
         ablation({}, 7.75, 0.25),
-        ablation({"adversary_s": 9.0, "separation_m": 4.0}, 12.5, 0.0, "4.0"),
+        ablation({"adversary_horizon_s": 9.0, "separation_m": 4.0}, 12.5, 0.0, "4.0"),
     ]
     pages = write_pages(results, tmp_path)
     assert [page.name for page in pages] == ["json_keys.md", "price.md", "price.png"]

@@ -86,7 +86,7 @@ def test_the_page_holds_the_record(game_record, tmp_path, compress):
         np.testing.assert_array_equal(bits & mask != 0, record[name])
     np.testing.assert_array_equal(values["reason"].T, record["reason"])
     np.testing.assert_array_equal(values["intervened"].T != 0, record["intervened"])
-    np.testing.assert_allclose(values["certificate"].T, record["certificate_m"], atol=1e-3)
+    np.testing.assert_allclose(values["certificate"].T, record["safety_margin_m"], atol=1e-3)
     for name in ("wanted", "sent"):
         usable = np.isfinite(record[name]).all(axis=-1)
         np.testing.assert_array_equal(np.isfinite(values[f"{name}_speed"].T), usable)
@@ -158,7 +158,7 @@ def test_a_full_game_stays_small(game_meta, game_record, tmp_path):
     position = np.array([20.0, 20.0]) + np.cumsum(way, axis=0) % 30.0
     arrays = {name: np.resize(game_record[name], (steps + 1, *game_record[name].shape[1:])) for name in game_record}
     arrays |= {"position": position, "heading_deg": turn, "breaches": np.zeros((0, 4))}
-    for name in ("reason", "intervened", "certificate_m"):
+    for name in ("reason", "intervened", "safety_margin_m"):
         arrays[name] = arrays[name][:-1]
     for name in ("wanted", "sent"):
         arrays[name] = np.stack([random.uniform(0, 2, (steps, n)), random.uniform(-180, 180, (steps, n))], axis=-1)
@@ -168,7 +168,7 @@ def test_a_full_game_stays_small(game_meta, game_record, tmp_path):
 
 
 def test_a_game_without_a_step_can_be_replayed(game_record, tmp_path):
-    commands = ("wanted", "sent", "reason", "intervened", "certificate_m")
+    commands = ("wanted", "sent", "reason", "intervened", "safety_margin_m")
     empty = {name: values[:0] if name in commands else values for name, values in game_record.items()}
     states = (
         "position",

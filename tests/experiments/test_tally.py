@@ -30,7 +30,7 @@ def record_of(position, shielded=True, **arrays):
         "sent": np.zeros((steps, 4, 2)),
         "reason": reason,
         "intervened": np.zeros((steps, 4)),
-        "certificate_m": np.full((steps, 4), np.nan),
+        "safety_margin_m": np.full((steps, 4), np.nan),
         "breaches": np.zeros((0, 4)),
     }
     return make_record(meta, **{**base, **arrays})

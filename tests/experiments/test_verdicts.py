@@ -214,7 +214,7 @@ def test_the_longest_list_is_cut(monkeypatch, stored, tmp_path):
 
 def test_games_of_one_kind_only_have_one_kind_of_line(stored):
     verdicts = summarise_verdicts([row for row in with_verdicts(stored[1].rows, 1) if row["shielded"]])
-    assert [line[0] for line in verdict_rows(verdicts, str)] == ["team-mate, on", "opponent, on"]
+    assert [line[0] for line in verdict_rows(verdicts, str)] == ["teammate, on", "opponent, on"]
     assert math.isclose(verdicts["on"]["opponent"]["avoidable_per_game"]["value"], 1.0)
     assert verdicts["off"]["games"] == 0
 

@@ -22,7 +22,7 @@ from steerclear.policies.submissions.made_for import (
 from steerclear.shield.exceptions import PolicyError
 
 GAME = GameConfig.preset("mctf2026")
-MADE = MadeFor("mctf2026", 1.0, platform_names(GAME), 2.5, {"separation_m": 2.5, "adversary_s": "inf"})
+MADE = MadeFor("mctf2026", 1.0, platform_names(GAME), 2.5, {"separation_m": 2.5, "adversary_horizon_s": "inf"})
 SOLUTION = textwrap.dedent(
     """
     class solution:
@@ -130,5 +130,5 @@ def test_a_policy_of_ones_own_program_tells_it_once_and_refuses(tmp_path, caplog
 
 
 def test_settings_are_json_that_every_reader_takes():
-    assert json.loads(MADE.to_bytes(), parse_constant=pytest.fail)["shield"]["adversary_s"] == "inf"
+    assert json.loads(MADE.to_bytes(), parse_constant=pytest.fail)["shield"]["adversary_horizon_s"] == "inf"
     assert json.loads(MadeFor("x", 1.0).to_bytes(), parse_constant=pytest.fail)["separation_m"] is None

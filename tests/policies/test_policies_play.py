@@ -276,7 +276,7 @@ def test_plays_in_a_shielded_env(team):
         observations, *_, infos = env.step(actions)
         for boat, agent in enumerate(own):
             decision = infos[agent]["shield"]
-            asked = decision.wanted_speed_mps, math.degrees(decision.wanted_heading_rad) - heading_deg[boat]
+            asked = decision.nominal_speed_mps, math.degrees(decision.nominal_heading_rad) - heading_deg[boat]
             assert asked[0] == pytest.approx(wanted[boat, 0])
             assert (asked[1] - wanted[boat, 1] + 180.0) % 360.0 == pytest.approx(180.0)
     assert (np.hypot(*(game.view().position - start)[:3].T) > 0.2).all()

@@ -17,7 +17,7 @@ class Run(NamedTuple):
     position: np.ndarray
     reason: np.ndarray
     sent: np.ndarray
-    certificate_m: np.ndarray
+    safety_margin_m: np.ndarray
     intervened: np.ndarray | None = None
     cut_short: np.ndarray | None = None
     solver: np.ndarray | None = None
@@ -49,11 +49,11 @@ def sail(shield, fleet, wanted, steps, surroundings=None):
     for step in range(steps):
         now = Fleet(state, fleet.team, fleet.platforms, fleet.controlled, fleet.names)
         decisions = shield.decide(now, Commands.relative_deg(wanted(step, state)), surroundings)
-        step_all(params, state[None], decisions.sent.values[None], shield.config.dt_s)
+        step_all(params, state[None], decisions.filtered.values[None], shield.config.dt_s)
         position.append(state[:, :2].copy())
         reason.append(decisions.reason.copy())
-        sent.append(decisions.sent.values.copy())
-        certificate.append(decisions.certificate_m.copy())
+        sent.append(decisions.filtered.values.copy())
+        certificate.append(decisions.safety_margin_m.copy())
         intervened.append(decisions.intervened.copy())
         cut.append(decisions.cut_short.copy())
         solver.append(decisions.solver.copy())
@@ -74,7 +74,7 @@ def sail_games(config, state, platforms, team, wanted, steps, ours=None, surroun
         position.append(state[..., :2].copy())
         reason.append(shield.reason.copy())
         sent.append(commands.copy())
-        certificate.append(shield.certificate_m.copy())
+        certificate.append(shield.safety_margin_m.copy())
     return Run(np.array(position), np.array(reason), np.array(sent), np.array(certificate))
 
 

@@ -24,7 +24,7 @@ def press(platform, start, course, surroundings, **settings):
         error = (course(state[:, 0]) - state[:, 0, L.HEADING] + 180.0) % 360.0 - 180.0
         return np.stack([np.full(len(state), top), error], axis=-1)[:, None]
 
-    config = ShieldConfig(edge_m=EDGE_M, hull_m=HULL_M, **settings)
+    config = ShieldConfig(edge_m=EDGE_M, obstacle_clearance_m=HULL_M, **settings)
     run = sail_games(config, start, [platform], [0], wanted, STEPS, surroundings=surroundings)
     turns = (np.diff(headings, axis=0) + 180.0) % 360.0 - 180.0
     return run.position[:, :, 0], turns, np.array(speeds)

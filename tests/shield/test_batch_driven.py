@@ -54,9 +54,9 @@ def test_a_batch_foresees_driven_boats_as_single_shields_do(preset):
                 visiting=~core.on_side[b],
             )
             told = Shield(shield.config).decide(fleet, Commands.game_deg(wanted[b]), around)
-            assert np.allclose(told.sent.values, sent[b], atol=1e-6)  # the program is solved otherwise
+            assert np.allclose(told.filtered.values, sent[b], atol=1e-6)  # the program is solved otherwise
             assert np.array_equal(told.reason, shield.reason[b])
-            assert np.allclose(told.certificate_m[ours[b]], shield.certificate_m[b, ours[b]], atol=1e-6)
+            assert np.allclose(told.safety_margin_m[ours[b]], shield.safety_margin_m[b, ours[b]], atol=1e-6)
 
 
 def as_pyquaticus(core, b):
@@ -115,7 +115,7 @@ def crossing(shield, driven):
     state[0, 0, :5], state[0, 1, :5] = (0.0, 0.0, 0.0, 2.0, 60.0), (12.0, 14.0, 270.0, 2.0, 60.0)
     shield.reset()
     shield.decide(state, np.array([[[2.0, 0.0], [2.0, 0.0]]]), np.array([[True, False]]), driven=driven)
-    return shield.certificate_m[0, 0]
+    return shield.safety_margin_m[0, 0]
 
 
 def test_who_is_sure_to_lie_still_is_not_feared_as_who_may_come_near():

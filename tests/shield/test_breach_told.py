@@ -30,7 +30,7 @@ AHEAD = Commands.relative_deg(np.array([[2.0, 0.0], [2.0, 0.0]]))
 @pytest.mark.parametrize("team", [(0, 1), (0, 0)])
 def test_the_certificate_in_breach_is_how_far_inside_the_boats_are(gap_m, coordination, team):
     decision = Shield(coordination=coordination).decide(two(gap_m, team), AHEAD)[0]
-    assert decision.certificate_m == pytest.approx(gap_m - KEPT_M)
+    assert decision.safety_margin_m == pytest.approx(gap_m - KEPT_M)
     assert decision.slack_m == pytest.approx(KEPT_M - gap_m)
 
 
@@ -39,7 +39,7 @@ def test_the_batch_tells_the_same(gap_m):
     state = np.array([[fresh_state(0.0, 0.0, 0.0, 2.0), fresh_state(0.0, gap_m, 180.0, 2.0)]])
     batch = BatchedShield(ShieldConfig(), 1, ("heron", "heron"), (0, 1))
     batch.decide(state, AHEAD.values[None], np.array([[True, False]]))
-    assert batch.certificate_m[0, 0] == pytest.approx(gap_m - KEPT_M)
+    assert batch.safety_margin_m[0, 0] == pytest.approx(gap_m - KEPT_M)
 
 
 @pytest.mark.parametrize("wanted", [[[2.0, 0.0]] * 2, np.zeros((2, 2)), None])

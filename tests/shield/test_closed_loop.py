@@ -45,10 +45,10 @@ def wander(platform, n, seed):
 @pytest.mark.parametrize(("platform", "spread_m"), [("heron", 15), ("surveyor", 30)])
 @pytest.mark.parametrize("certificate", ["turning_circle", "value_table"])
 def test_team_mates_never_come_too_near(certificate, platform, spread_m, dt_s):
-    config = ShieldConfig(dt_s=dt_s, certificate=certificate)
+    config = ShieldConfig(dt_s=dt_s, opponent_model=certificate)
     state = starts(platform, 3, spread_m, 3)
     run = sail_games(config, state, [platform] * 3, [0, 0, 0], wander(platform, 3, 4), int(STEPS_S / dt_s))
-    certified = (run.certificate_m[0] >= 0).all(axis=-1)
+    certified = (run.safety_margin_m[0] >= 0).all(axis=-1)
     assert certified.sum() >= GAMES // 3
     assert run.closest(np.ones(3, bool))[certified].min() >= config.separation_m
 
@@ -56,7 +56,7 @@ def test_team_mates_never_come_too_near(certificate, platform, spread_m, dt_s):
 @pytest.mark.parametrize("dt_s", [0.1, 0.05])
 @pytest.mark.parametrize(("platform", "spread_m"), [("heron", 12), ("surveyor", 30), ("si", 60)])
 def test_opponents_that_hold_their_course_are_avoided(platform, spread_m, dt_s):
-    config = ShieldConfig(dt_s=dt_s, adversary_s=0.0)
+    config = ShieldConfig(dt_s=dt_s, adversary_horizon_s=0.0)
     state = starts(platform, 3, spread_m, 5)
     top = get_platform(platform).max_speed_mps
     state[:, :, L.SPEED] = top
@@ -70,7 +70,7 @@ def test_opponents_that_hold_their_course_are_avoided(platform, spread_m, dt_s):
         return commands
 
     run = sail_games(config, state, [platform] * 3, [0, 1, 1], wanted, int(STEPS_S / dt_s))
-    certified = run.certificate_m[0][:, 0] >= 0
+    certified = run.safety_margin_m[0][:, 0] >= 0
     assert certified.sum() >= GAMES // 3
     assert run.closest(np.array([True, False, False]))[certified].min() >= config.separation_m
 
@@ -119,12 +119,12 @@ def test_a_boat_sent_out_for_ever_stays_in_by_absolute_headings(name, around):
     """Half a turn commanded is one to the other side once it is an absolute heading."""
     params, state = packed([name])[0], np.zeros(L.N_STATE)
     state[[L.X, L.Y, L.SPEED_ERROR, L.HEADING_ERROR]] = 40.0, 50.0, np.nan, np.nan
-    shield, highest = Shield(surroundings=Surroundings(**around), hull_m=0.2), 0.0
+    shield, highest = Shield(surroundings=Surroundings(**around), obstacle_clearance_m=0.2), 0.0
     for _ in range(600):
         now = Fleet(state[None].copy(), np.array([0]), (name,), np.array([True]), ("a",))
         sent = shield.decide(now, Commands.absolute_rad([[params[L.MAX_SPEED], 0.0]]))[0]
-        error = (np.degrees(sent.sent_heading_rad) - state[L.HEADING] + 180.0) % 360.0 - 180.0
-        step_boat(params, state, sent.sent_speed_mps, error, 0.1)
+        error = (np.degrees(sent.filtered_heading_rad) - state[L.HEADING] + 180.0) % 360.0 - 180.0
+        step_boat(params, state, sent.filtered_speed_mps, error, 0.1)
         highest = max(highest, state[L.Y])
     assert 79.0 < highest < 80.0
 
@@ -135,7 +135,7 @@ def test_a_command_changed_for_an_edge_alone_says_so():
         fleet, Commands.relative_deg([[2.0, -85.0], [1.5, 0.0]])
     )
     assert list(decisions.intervened) == [True, False]
-    assert [each.binding for each in decisions] == [("field",), ()]
+    assert [each.active_constraints for each in decisions] == [("field",), ()]
 
 
 @pytest.mark.parametrize("name", ["heron", "surveyor"])

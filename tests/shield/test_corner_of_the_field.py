@@ -1,4 +1,4 @@
-"""Team-mates that all want to the same corner of the field keep clear of each other, and hardly ever leave it."""
+"""Teammates that all want to the same corner of the field keep clear of each other, and hardly ever leave it."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Team-mates that wander about a field hardly large enough for them keep clear of each other, and all but inside."""
+"""Teammates that wander about a field hardly large enough for them keep clear of each other, and all but inside."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What the decision core is measured by: rammers about boats of ours, teams that cross, and crowds of team-mates.
+"""What the decision core is measured by: rammers about boats of ours, teams that cross, and crowds of teammates.
 
 Scenes hang on the seed alone, so that runs of two versions are of the same scenes: run this file in a checkout of each,
 with ``-m study``, for the figures in docs/studies/core.md.
@@ -22,24 +22,24 @@ STEPS, DT_S, HIT_M, KEPT_M = 300, 0.1, 2.0, 2.499
 
 
 class Family(NamedTuple):
-    """Boats of ours about the origin, rammers around; and hits of rammers and team-mates too near, in 500 scenes."""
+    """Boats of ours about the origin, rammers around; and hits of rammers and teammates too near, in 500 scenes."""
 
     platform: str
     ours: int
     rammers: int
     hits: int
     too_near: int
-    profile: str = "players"
+    profile: str = "competitive"
 
 
 FAMILIES = {
     "two rammers, heron": Family("heron", 1, 2, 0, 0),
     "three rammers, heron": Family("heron", 1, 3, 0, 0),
-    "two rammers, heron, profile rammers": Family("heron", 1, 2, 0, 0, "rammers"),
+    "two rammers, heron, profile ramming": Family("heron", 1, 2, 0, 0, "ramming"),
     "two rammers, surveyor": Family("surveyor", 1, 2, 30, 0),
     "three rammers, surveyor": Family("surveyor", 1, 3, 37, 0),
-    "four team-mates, herons": Family("heron", 4, 0, 0, 0),
-    "four team-mates, surveyors": Family("surveyor", 4, 0, 0, 6),
+    "four teammates, herons": Family("heron", 4, 0, 0, 0),
+    "four teammates, surveyors": Family("surveyor", 4, 0, 0, 6),
     "three and three rammers, herons": Family("heron", 3, 3, 2, 0),
     "three and three rammers, surveyors": Family("surveyor", 3, 3, 41, 3),
 }
@@ -90,7 +90,7 @@ def headed_for(state, goal, family):
 
 
 def closest(family, games):
-    """Closest distances (B,) of rammers and of team-mates, m, share of commands changed, and us a decision."""
+    """Closest distances (B,) of rammers and of teammates, m, share of commands changed, and us a decision."""
     (state, goal), ours = scenes(family, games), family.ours
     n, params = ours + family.rammers, packed([family.platform] * (ours + family.rammers))
     team, changed, spent_s = (0,) * ours + (1,) * family.rammers, 0, 0.0
@@ -113,7 +113,7 @@ def closest(family, games):
 
 @pytest.mark.parametrize("name", FAMILIES)
 def test_a_few_scenes_of_each_family_keep_apart(name):
-    """Of herons none is hit, and no team-mate comes too near."""
+    """Of herons none is hit, and no teammate comes too near."""
     family = FAMILIES[name]
     rammed, mates, _, _ = closest(family, 6)
     assert (mates >= KEPT_M).all()
@@ -129,7 +129,7 @@ def test_no_more_is_hit_than_was(name):
     hits, near = int((rammed < HIT_M).sum()), int((mates < KEPT_M).sum())
     low = int((rammed < KEPT_M).sum())
     LOG.warning(
-        "%s: %d hits, %d below 2.5 m, %d team-mates below, least %.2f m, changed %.2f %%, %.0f us",
+        "%s: %d hits, %d below 2.5 m, %d teammates below, least %.2f m, changed %.2f %%, %.0f us",
         *(name, hits, low, near, mates.min(), 100.0 * changed, took_us),
     )
     assert hits <= chi2.ppf(0.975, 2 * family.hits + 2) / 2.0

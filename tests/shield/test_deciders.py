@@ -41,8 +41,8 @@ def test_a_single_decision_is_a_batch_of_one_bit_for_bit(delay_s):
         sent = batch.decide(states, wanted, ours).copy()
         for game, guard in enumerate(singles):
             answer = guard.decide(replace(fleets[game], state=states[game].copy()), Commands.game_deg(wanted[game]))
-            assert bits(answer.sent.values) == bits(sent[game])
-            assert bits(answer.certificate_m) == bits(batch.certificate_m[game])
+            assert bits(answer.filtered.values) == bits(sent[game])
+            assert bits(answer.safety_margin_m) == bits(batch.safety_margin_m[game])
             assert (answer.reason == batch.reason[game]).all()
             changed += int(answer.intervened.sum())
         if step == 30:  # copies go on as what they are copies of
@@ -58,9 +58,9 @@ def told(coordination, **more) -> Decisions:
 
 def test_boats_that_are_not_ours_decide_nothing_and_are_feared_alike():
     team, each = told("team"), told("per_boat")
-    np.testing.assert_array_equal(team.feared_s, each.feared_s)
-    assert np.isnan(team.feared_s[:3]).all()
-    assert (team.feared_s[3:] > 0.0).all()
+    np.testing.assert_array_equal(team.adversary_horizon_s, each.adversary_horizon_s)
+    assert np.isnan(team.adversary_horizon_s[:3]).all()
+    assert (team.adversary_horizon_s[3:] > 0.0).all()
     shield = Shield(coordination="per_boat")
     shield.decide(crowd(3), relative(*[(2.0, 10.0)] * 5))
     assert (shield._deciders.scene.given[:, :, OURS] != 0.0).any(axis=1).tolist() == [True, True, True, False, False]
@@ -71,7 +71,7 @@ def test_boats_that_are_not_ours_decide_nothing_and_are_feared_alike():
 def test_whoever_is_of_no_team_of_ours_is_feared_whatever_its_number(teams):
     fleet = fleet_of([(0, 0, 0, 2.0), (20.0, 0, 0, 2.0), (10.0, 40.0, 180.0, 2.0)], teams)
     fleet = replace(fleet, controlled=np.array([True, True, False]))
-    assert Shield().decide(fleet, relative(*[(2.0, 0.0)] * 3)).feared_s[2] > 0.0
+    assert Shield().decide(fleet, relative(*[(2.0, 0.0)] * 3)).adversary_horizon_s[2] > 0.0
 
 
 @pytest.mark.parametrize("coordination", ["team", "per_boat"])
@@ -105,7 +105,7 @@ def test_whatever_is_wanted_and_wherever_boats_are_what_is_sent_is_a_command(del
         fleet = fleet_of([(0.0, 0.0, 0.0, 1.0)] * len(team), team)
         for value in (1.0, np.nan, np.inf, -np.inf, 1e9, -1e9):
             decisions = shield.decide(fleet, relative(*[(value, value)] * len(team)))
-            sent, own = decisions.sent.values[fleet.controlled], fleet.controlled
+            sent, own = decisions.filtered.values[fleet.controlled], fleet.controlled
             assert (np.abs(sent) <= 1e6).all()
             assert (decisions.reason[own] != Reason.NOT_COVERED).all()
             assert np.isfinite(decisions.slack_m).all()

@@ -22,9 +22,9 @@ def wanted_for(n, seed):
 def test_what_is_not_changed_is_sent_bit_for_bit_and_all_is_finite(fleet, seed):
     wanted = Commands.relative_deg(wanted_for(len(fleet), seed))
     decisions = Shield().decide(fleet, wanted)
-    assert np.isfinite(decisions.sent.values).all()
+    assert np.isfinite(decisions.filtered.values).all()
     same = ~decisions.intervened
-    assert decisions.sent.values[same].tobytes() == wanted.values[same].tobytes()
+    assert decisions.filtered.values[same].tobytes() == wanted.values[same].tobytes()
     assert not decisions.intervened[~fleet.controlled].any()
 
 
@@ -35,7 +35,7 @@ def test_a_command_that_is_no_number_is_held(fleet, bad, column):
     values[:, column] = bad
     decisions = Shield().decide(fleet, Commands.relative_deg(values))
     ours = fleet.controlled
-    assert np.isfinite(decisions.sent.values[ours]).all()
+    assert np.isfinite(decisions.filtered.values[ours]).all()
     assert Reason.PASSED not in decisions.reason[ours]
 
 
@@ -44,7 +44,7 @@ def test_signed_zeros_and_tiny_numbers_pass_as_they_are(frame):
     make = Commands.relative_deg if frame == "relative" else Commands.absolute_rad
     wanted = make([[1.5, -0.0], [5e-324, 0.1]])
     fleet = fleet_of([(0, 0, 0, 1), (60, 0, 0, 1)], [0, 0])
-    assert Shield().decide(fleet, wanted).sent.values.tobytes() == wanted.values.tobytes()
+    assert Shield().decide(fleet, wanted).filtered.values.tobytes() == wanted.values.tobytes()
 
 
 def test_the_same_inputs_give_the_same_bits():
@@ -52,7 +52,7 @@ def test_the_same_inputs_give_the_same_bits():
     for _ in range(2):
         shield = Shield()
         runs.append(
-            [shield.decide(head_on(gap), relative((2, 0), (2, 0))).sent.values.tobytes() for gap in (6, 5.5, 5)]
+            [shield.decide(head_on(gap), relative((2, 0), (2, 0))).filtered.values.tobytes() for gap in (6, 5.5, 5)]
         )
     assert runs[0] == runs[1]
 
@@ -63,23 +63,23 @@ def test_a_boat_far_away_changes_nothing():
     crowd = fleet_of([*near, (900, 900, 0, 2)], [0, 1, 1])
     both = Shield().decide(crowd, relative((2, 0), (2, 0), (2, 0)))
     assert alone.intervened[0]
-    assert alone.sent.values[0].tobytes() == both.sent.values[0].tobytes()
+    assert alone.filtered.values[0].tobytes() == both.filtered.values[0].tobytes()
 
 
 def test_mirrored_water_gives_the_mirrored_command():
     left = Shield().decide(fleet_of([(0, 0, 0, 2), (0.7, 5.1, 180, 2)], [0, 1]), relative((2, 5), (2, 0)))
     right = Shield().decide(fleet_of([(0, 0, 0, 2), (-0.7, 5.1, 180, 2)], [0, 1]), relative((2, -5), (2, 0)))
     assert left.intervened[0]
-    np.testing.assert_allclose(left.sent.values[0] * [1, -1], right.sent.values[0], atol=1e-9)
+    np.testing.assert_allclose(left.filtered.values[0] * [1, -1], right.filtered.values[0], atol=1e-9)
 
 
 def test_a_decision_says_everything():
     decision = Shield().decide(head_on(5.5), relative((2, 0), (2, 0)))[0]
     assert decision.reason in (Reason.LEAST_CHANGE, Reason.BACKUP)
-    assert decision.binding == ("boat_1",)
-    assert decision.certificate_m >= 0
+    assert decision.active_constraints == ("boat_1",)
+    assert decision.safety_margin_m >= 0
     assert decision.solver == (None if decision.reason is Reason.BACKUP else "line_search")
-    assert decision.sent_heading_rad != decision.wanted_heading_rad
+    assert decision.filtered_heading_rad != decision.nominal_heading_rad
 
 
 def test_in_breach_the_boats_part():
@@ -118,8 +118,8 @@ def test_a_state_that_is_no_number_is_refused(column):
         ({"separation": 2.0}, "did you mean 'separation_m'"),
         ({"separation_m": -1.0}, "must be > 0"),
         ({"separation_m": float("nan")}, "give a number"),
-        ({"adversary_s": -2.0}, ">= 0"),
-        ({"certificate": "magic"}, "turning_circle"),
+        ({"adversary_horizon_s": -2.0}, ">= 0"),
+        ({"opponent_model": "magic"}, "turning_circle"),
         ({"solver": "nosuch"}, "installed"),
         ({"coordination": "chaos"}, "team, per_boat"),
     ],
@@ -148,7 +148,7 @@ def test_decisions_that_say_the_same_are_equal_however_long_they_took():
     assert hash(one) == hash(slow)
     assert one != replace(other, slack_m=0.5)
     assert one != "decision"
-    nobody = replace(one, wanted_heading_rad=float("nan"))
-    assert nobody == replace(one, wanted_heading_rad=float("inf") - float("inf"))
+    nobody = replace(one, nominal_heading_rad=float("nan"))
+    assert nobody == replace(one, nominal_heading_rad=float("inf") - float("inf"))
     assert hash(nobody) == hash(replace(nobody, solve_time_s=1.0))
     assert nobody != one

@@ -37,7 +37,7 @@ def single(config, fleet):
 
     def decide(state, wanted):
         now = Fleet(state, fleet.team, fleet.platforms, fleet.controlled, fleet.names)
-        return shield.decide(now, Commands.relative_deg(wanted)).sent.values
+        return shield.decide(now, Commands.relative_deg(wanted)).filtered.values
 
     return decide
 
@@ -102,8 +102,8 @@ def test_what_others_told_a_boat_before_it_was_ours_may_be_nonsense(nonsense):
     taken = Fleet(fleet.state, fleet.team, fleet.platforms, np.array([False, False]), fleet.names)
     shield.decide(taken, Commands.relative_deg([nonsense, (2.0, 0.0)]))
     decision = shield.decide(fleet, Commands.relative_deg([(2.0, 0.0), (2.0, 0.0)]))[0]
-    assert np.isfinite([decision.sent_speed_mps, decision.sent_heading_rad, decision.certificate_m]).all()
-    assert decision.certificate_m < 0.0
+    assert np.isfinite([decision.filtered_speed_mps, decision.filtered_heading_rad, decision.safety_margin_m]).all()
+    assert decision.safety_margin_m < 0.0
 
 
 @pytest.mark.parametrize(("delay_s", "steps"), [(0.0, 0), (0.04, 1), (0.1, 1), (0.14, 2), (0.3, 3)])

@@ -1,4 +1,4 @@
-"""What a backup need not do is given back: all of it is the wanted command itself, and says so."""
+"""What a backup need not do is given back: all of it is the nominal command itself, and says so."""
 
 import numpy as np
 from shield_loops import sail, scattered
@@ -8,7 +8,7 @@ from steerclear.shield.decision import SOLVERS
 
 
 def test_who_is_sent_what_it_wants_is_told_so():
-    """Six herons with wants of their own, no opponents: no wanted command sent bit for bit is said to be changed."""
+    """Six herons with wants of their own, no opponents: no nominal command sent bit for bit is said to be changed."""
     backed_up = blended = 0
     for seed in range(40):
         random = np.random.default_rng(seed)

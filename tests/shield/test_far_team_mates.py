@@ -1,4 +1,4 @@
-"""What a boat is told to do does not hang on team-mates that have nothing to do with it."""
+"""What a boat is told to do does not hang on teammates that have nothing to do with it."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ STEPS = 250
 
 
 def chased(mates, ahead_m, course_deg):
-    """Run of a heron that presses on the upper edge with a pursuer behind it, and of its two team-mates far away."""
+    """Run of a heron that presses on the upper edge with a pursuer behind it, and of its two teammates far away."""
     rows = [(100.0, 70.0, 60.0, 2.0), (100.0 - ahead_m, 62.0, 60.0, 2.0)]
     rows += [(500.0, 20.0, 90.0, 1.5), (500.0, 22.58, 90.0, 1.5)] if mates else []
     fleet = fleet_of(rows, [0, 1, 0, 0][: len(rows)], "heron")
@@ -135,7 +135,7 @@ def test_groups_that_cannot_meet_are_decided_for_as_if_each_were_alone(seed):
     n = len(near[0])
     np.testing.assert_allclose(together.position[:, :n], alone.position, atol=1e-6)
     np.testing.assert_array_equal(together.reason[:, :n], alone.reason)
-    np.testing.assert_allclose(together.certificate_m[:, :n], alone.certificate_m, atol=1e-6)
+    np.testing.assert_allclose(together.safety_margin_m[:, :n], alone.safety_margin_m, atol=1e-6)
     mine = remembered(one)
     np.testing.assert_allclose(remembered(both)[:n, : mine.shape[1]], mine, atol=1e-6)
 
@@ -148,7 +148,7 @@ def abreast(first, other):
     rows = [(0.0, 0.0, 0.0, 2.5), (0.0, 20.0, 180.0, 3.0), (105.0, 0.0, 0.0, 2.5), (210.0, 0.0, 0.0, 3.0), other]
     fleet = fleet_of(rows[first:], [0, 1, 0, 0, 1][first:], "surveyor")
     fleet.state[:, L.THRUST] = 100.0
-    decisions = Shield(profile="rammers").decide(fleet, Commands.relative_deg(np.tile([3.0, 0.0], (len(fleet), 1))))
+    decisions = Shield(profile="ramming").decide(fleet, Commands.relative_deg(np.tile([3.0, 0.0], (len(fleet), 1))))
     assert first > 0 or decisions[0].intervened
     return decisions[len(fleet) - 2]
 
@@ -161,6 +161,6 @@ def test_what_is_told_of_a_boat_hangs_on_no_backup_of_one_that_it_cannot_meet():
         other = (210.0 + far_m * np.sin(bearing), far_m * np.cos(bearing), random.uniform(-180.0, 180.0), 3.0)
         alone, together = abreast(2, other), abreast(0, other)
         assert together.reason == alone.reason
-        assert together.certificate_m == pytest.approx(alone.certificate_m, abs=1e-9)
-        close += alone.reason == Reason.PASSED and alone.certificate_m < 2.0
+        assert together.safety_margin_m == pytest.approx(alone.safety_margin_m, abs=1e-9)
+        close += alone.reason == Reason.PASSED and alone.safety_margin_m < 2.0
     assert close > 5

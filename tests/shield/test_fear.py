@@ -23,67 +23,71 @@ def near(**more):
     return replace(fleet, state=state, **more)
 
 
-def certificate_m(fleet, **settings):
-    return Shield(**settings).decide(fleet, STRAIGHT)[0].certificate_m
+def safety_margin_m(fleet, **settings):
+    return Shield(**settings).decide(fleet, STRAIGHT)[0].safety_margin_m
 
 
 @pytest.mark.parametrize(
     ("settings", "always_s", "visiting_s"),
     [
         ({}, 12.0, 7.0),
-        ({"profile": "rammers"}, np.inf, np.inf),
-        ({"profile": "hold-course"}, 0.0, 0.0),
-        ({"adversary_s": 9.0}, 9.0, 9.0),
-        ({"visitor_s": 3.0}, 12.0, 3.0),
-        ({"adversary_s": 20.0, "visitor_s": 0.0}, 20.0, 0.0),
+        ({"profile": "ramming"}, np.inf, np.inf),
+        ({"profile": "constant_velocity"}, 0.0, 0.0),
+        ({"adversary_horizon_s": 9.0}, 9.0, 9.0),
+        ({"intruder_horizon_s": 3.0}, 12.0, 3.0),
+        ({"adversary_horizon_s": 20.0, "intruder_horizon_s": 0.0}, 20.0, 0.0),
     ],
 )
 def test_a_profile_says_both_and_one_dial_turns_both(settings, always_s, visiting_s):
     config = ShieldConfig(**settings)
-    assert (config.feared_s, config.visitor_feared_s) == (always_s, visiting_s)
+    assert (config.effective_adversary_horizon_s, config.effective_intruder_horizon_s) == (always_s, visiting_s)
 
 
 @pytest.mark.parametrize("value", [-1.0, np.nan, "6", True])
 def test_a_time_that_is_none_is_refused(value):
-    with pytest.raises(ConfigError, match="visitor_s"):
-        ShieldConfig(visitor_s=value)
+    with pytest.raises(ConfigError, match="intruder_horizon_s"):
+        ShieldConfig(intruder_horizon_s=value)
 
 
 def test_a_visitor_is_feared_as_if_all_were_for_its_time():
     visiting = near(visiting=np.array([False, True]))
-    assert certificate_m(visiting) == certificate_m(near(), adversary_s=7.0)
-    assert certificate_m(visiting) > certificate_m(near()) + 0.1, "else the scene shows nothing"
+    assert safety_margin_m(visiting) == safety_margin_m(near(), adversary_horizon_s=7.0)
+    assert safety_margin_m(visiting) > safety_margin_m(near()) + 0.1, "else the scene shows nothing"
 
 
 def test_of_our_own_it_does_not_matter_where_they_are():
-    assert certificate_m(near(visiting=np.array([True, False]))) == certificate_m(near())
+    assert safety_margin_m(near(visiting=np.array([True, False]))) == safety_margin_m(near())
 
 
 def test_what_the_caller_says_of_a_boat_comes_first():
-    fleet = near(visiting=np.array([False, True]), adversary_s=np.array([np.nan, 20.0]))
-    assert certificate_m(fleet) == certificate_m(near(), adversary_s=20.0)
-    unsaid = near(adversary_s=np.array([np.nan, np.nan]))
-    assert certificate_m(unsaid) == certificate_m(near())
+    fleet = near(visiting=np.array([False, True]), adversary_horizon_s=np.array([np.nan, 20.0]))
+    assert safety_margin_m(fleet) == safety_margin_m(near(), adversary_horizon_s=20.0)
+    unsaid = near(adversary_horizon_s=np.array([np.nan, np.nan]))
+    assert safety_margin_m(unsaid) == safety_margin_m(near())
 
 
 def test_a_decision_says_how_long_it_feared_whom():
     told = Shield().decide(near(visiting=np.array([False, True])), STRAIGHT)
-    assert [decision.feared_s for decision in told] == [None, 7.0]
-    assert [d.feared_s for d in Shield(profile="rammers").decide(near(), STRAIGHT)] == [None, np.inf]
-    told = Shield(profile="hold-course").decide(near(adversary_s=np.array([np.nan, 20.0])), STRAIGHT)
-    assert [d.feared_s for d in told] == [None, 0.0], "with this profile nobody is feared, whatever is said of one"
+    assert [decision.adversary_horizon_s for decision in told] == [None, 7.0]
+    assert [d.adversary_horizon_s for d in Shield(profile="ramming").decide(near(), STRAIGHT)] == [None, np.inf]
+    told = Shield(profile="constant_velocity").decide(near(adversary_horizon_s=np.array([np.nan, 20.0])), STRAIGHT)
+    assert [d.adversary_horizon_s for d in told] == [None, 0.0], (
+        "with this profile nobody is feared, whatever is said of one"
+    )
 
 
 def test_it_is_told_in_the_fleets_order():
     fleet = fleet_of(
         [(0.0, 0.0, 0.0, 1.0), (30.0, 0.0, 0.0, 1.0), (0.0, 30.0, 0.0, 1.0)], [1, 0, 1], names=["c", "a", "b"]
     )
-    fleet = replace(fleet, adversary_s=np.array([3.0, np.nan, 5.0]))
+    fleet = replace(fleet, adversary_horizon_s=np.array([3.0, np.nan, 5.0]))
     told = Shield().decide(fleet, relative((1.0, 0.0), (1.0, 0.0), (1.0, 0.0)))
-    assert [decision.feared_s for decision in told] == [3.0, None, 5.0]
+    assert [decision.adversary_horizon_s for decision in told] == [3.0, None, 5.0]
 
 
-@pytest.mark.parametrize("more", [{"adversary_s": [0.0, -1.0]}, {"adversary_s": [1.0]}, {"visiting": [0.0, 0.5]}])
+@pytest.mark.parametrize(
+    "more", [{"adversary_horizon_s": [0.0, -1.0]}, {"adversary_horizon_s": [1.0]}, {"visiting": [0.0, 0.5]}]
+)
 def test_what_cannot_be_is_refused(more):
     with pytest.raises(FleetError, match=next(iter(more))):
         Fleet.of(
@@ -104,7 +108,7 @@ def test_a_batch_fears_as_single_decisions_do():
     for b in range(count):
         fleet = Fleet(states[b], np.array(team), platforms, ours[b], ("a", "b", "c"), visiting=visiting[b])
         one = Shield().decide(fleet, relative(*wanted[b]))
-        np.testing.assert_allclose(one.certificate_m, guard.certificate_m[b], atol=1e-6)
-        np.testing.assert_allclose(one.sent.values, sent[b], atol=1e-6)
+        np.testing.assert_allclose(one.safety_margin_m, guard.safety_margin_m[b], atol=1e-6)
+        np.testing.assert_allclose(one.filtered.values, sent[b], atol=1e-6)
     plain = BatchedShield(ShieldConfig(), count, platforms, team).decide(states, wanted, ours)
     assert (plain != sent).any(), "else visiting changes nothing"

@@ -64,8 +64,8 @@ def fleet(**changes):
         ({"age_s": [1.76e9, 0.0]}, r"age_s of boat 'boat_0' is 1.76e\+09; .* not the time of day"),
         ({"thrust": [1500.0, 0.0]}, "thrust of boat 'boat_0' is 1500; give percent up to 100 either way"),
         (
-            {"adversary_s": [0.0, -1.0]},
-            "adversary_s of boat 'boat_1' is -1; give s per boat, 0 to",
+            {"adversary_horizon_s": [0.0, -1.0]},
+            "adversary_horizon_s of boat 'boat_1' is -1; give s per boat, 0 to",
         ),
         ({"position_m": [[0.0, 0.0], [math.nan, 9.0]]}, "position of boat 'boat_1'.*give the last fix"),
         ({"heading_rad": [math.nan, 0.0]}, "heading of boat 'boat_0'"),
@@ -148,7 +148,7 @@ def test_numbers_at_the_ends_of_their_ranges_are_taken():
     ends = fleet(position_error_m=[0.0, 1000.0], age_s=[0.0, 3600.0], thrust=[-100.0, 100.0], speed_mps=[50.0, -50.0])
     assert ends.position_error_m.tolist() == [0.0, 1000.0]
     assert ends.age_s.tolist() == [0.0, 3600.0]
-    assert np.isinf(fleet(adversary_s=[math.inf, math.nan]).adversary_s[0])
+    assert np.isinf(fleet(adversary_horizon_s=[math.inf, math.nan]).adversary_horizon_s[0])
 
 
 def test_teams_and_who_is_controlled_may_be_told_by_true_and_false():
@@ -173,7 +173,7 @@ def test_rows_may_be_given_as_lists():
     for name in names:
         np.testing.assert_array_equal(getattr(given_lists, name), getattr(made, name))
     decided, again = (Shield().decide(one, AHEAD) for one in (made, given_lists))
-    assert decided.sent.values.tobytes() == again.sent.values.tobytes()
+    assert decided.filtered.values.tobytes() == again.filtered.values.tobytes()
     for name, wrong in (("state", [[0.0, "east"]]), ("team", [0, "red"]), ("controlled", ["yes", "no"])):
         with pytest.raises(FleetError, match=name):
             Shield().decide(Fleet(**{**lists, name: wrong}, platforms=made.platforms), AHEAD)
@@ -276,4 +276,4 @@ def test_a_fleet_without_boats_has_no_decisions():
     for coordination in ("team", "per_boat"):
         decisions = Shield(coordination=coordination).decide(nobody, Commands.relative_deg(np.zeros((0, 2))))
         assert len(decisions) == 0
-        assert decisions.sent.values.shape == (0, 2)
+        assert decisions.filtered.values.shape == (0, 2)

@@ -57,7 +57,7 @@ def test_the_place_foreseen_is_where_the_game_puts_the_boat(steps, platform):
     rules = {"decision_steps": steps, "platforms": platform, "power_play_share": 0.0, "max_time_s": 150.0}
     env = MctfEnv(GameConfig.preset("mctf2026", default_start=False, on_side_start=False, **rules), seed=4)
     blue, red = (
-        ShieldedTeamPolicy(policies.make("medium"), Shield.for_game(env, profile="rammers")),
+        ShieldedTeamPolicy(policies.make("medium"), Shield.for_game(env, profile="ramming")),
         policies.make("medium"),
     )
     observations, infos = env.reset(seed=4)
@@ -158,7 +158,7 @@ def test_a_drive_that_says_no_way_makes_nobody_harmless(row):
     """Such a boat is feared as any other; one whose drive is whole is not."""
 
     def decided(drive):
-        shield = Shield(profile="rammers")
+        shield = Shield(profile="ramming")
         fleet = Fleet.of(
             position_m=[[0, 0], [0, 6.5]],
             heading_rad=[0, np.pi],
@@ -169,7 +169,7 @@ def test_a_drive_that_says_no_way_makes_nobody_harmless(row):
         if drive is not None:
             fleet = replace(fleet, driven=np.array([[np.nan] * 4, drive]))
         told = shield.decide(fleet, Commands.relative_deg([[2.0, 0.0], [2.0, 0.0]]))
-        return told.sent.values.tolist(), told.certificate_m.tolist()
+        return told.filtered.values.tolist(), told.safety_margin_m.tolist()
 
     assert decided(row) == decided(None)
     assert decided((2.0, 60.0, 6.5, 100.0)) != decided(None)

@@ -19,7 +19,7 @@ ACTIONS, ACTIONS_OF_TWO = (
 
 
 def fleet_at(second):
-    """A boat with a team-mate beside it, and an opponent that comes towards both."""
+    """A boat with a teammate beside it, and an opponent that comes towards both."""
     return Fleet.of(
         position_m=[(2.0 * second, 0.0), (2.0 * second, 4.0), (6.0 - 2.0 * second, 0.5)],
         heading_rad=[0.0, 0.0, np.pi],
@@ -53,8 +53,8 @@ def test_what_passes_for_a_boat_alone_is_sent_as_it_is_and_nothing_is_remembered
         assert masks[1].all(), "an opponent's commands are not ours to refuse"
         passing.append(masks[0].mean())
         one, two = (shield.decide(fleet, ACTIONS_OF_TWO[4]) for shield in (asked, other))
-        assert one.sent.values.tobytes() == two.sent.values.tobytes()
-        assert one.certificate_m.tobytes() == two.certificate_m.tobytes()
+        assert one.filtered.values.tobytes() == two.filtered.values.tobytes()
+        assert one.safety_margin_m.tobytes() == two.safety_margin_m.tobytes()
     assert min(passing) < 1.0
     assert max(passing) > 0.0
 
@@ -76,7 +76,7 @@ def team_of(**options):
 
 
 def test_masks_of_a_batch_foretell_what_its_shield_lets_pass_and_change_nothing():
-    """Team-mates choose otherwise than a mask takes for granted: rarely that decides."""
+    """Teammates choose otherwise than a mask takes for granted: rarely that decides."""
     batch, other = team_of(), team_of()
     rng = np.random.default_rng(0)
     batch.reset(5), other.reset(5)

@@ -20,10 +20,10 @@ HARBOUR = Surroundings(
 )
 FORMS = st.fixed_dictionaries(
     {
-        "certificate": st.sampled_from(["turning_circle", "value_table"]),
+        "opponent_model": st.sampled_from(["turning_circle", "value_table"]),
         "coordination": st.sampled_from(["team", "per_boat"]),
-        "adversary_s": st.sampled_from([0.0, 3.0, math.inf]),
-        "response_per_s": st.sampled_from([0.5, math.inf]),
+        "adversary_horizon_s": st.sampled_from([0.0, 3.0, math.inf]),
+        "cbf_rate_per_s": st.sampled_from([0.5, math.inf]),
         "separation_m": st.sampled_from([2.5, 4.0, 1e-3]),
     }
 )
@@ -39,8 +39,8 @@ def test_whatever_goes_in_finite_commands_come_out(data, form, harbour):
     for _ in range(2):
         decisions = shield.decide(fleet, make(data.draw(any_commands(len(fleet)))))
         own = fleet.controlled
-        assert np.isfinite(decisions.sent.values[own]).all()
-        assert not np.isnan(decisions.certificate_m).any()
+        assert np.isfinite(decisions.filtered.values[own]).all()
+        assert not np.isnan(decisions.safety_margin_m).any()
         assert not np.isnan(decisions.slack_m).any()
         assert (decisions.slack_m >= 0.0).all()
         for decision in decisions:
@@ -55,8 +55,8 @@ def test_what_comes_out_is_within_the_boats_limits_when_changed(data, form):
     decisions = Shield(**form).decide(fleet, Commands.relative_deg(data.draw(finite_commands(len(fleet)))))
     top = {"heron": 2.0, "surveyor": 3.0, "si": 10.0, "di": 10.0, "large_usv": 12.0, "mctf2024_sim": 1.5}
     for i in np.flatnonzero(decisions.intervened):
-        speed, heading = decisions.sent.values[i]
-        wanted = decisions.wanted.values[i, 0]
+        speed, heading = decisions.filtered.values[i]
+        wanted = decisions.nominal.values[i, 0]
         assert 0.0 <= speed <= top[fleet.platforms[i]] or speed == wanted
         assert -180.0 <= heading <= 180.0
 
@@ -72,19 +72,19 @@ def test_a_command_that_is_none_holds_the_boat(value, column, make):
     assert decision.reason is Reason.HELD
     assert decision.fallback == "hold"
     assert decision.intervened
-    assert decision.sent_speed_mps == 0.0
-    assert decision.sent_heading_rad == pytest.approx(math.radians(30.0))
+    assert decision.filtered_speed_mps == 0.0
+    assert decision.filtered_heading_rad == pytest.approx(math.radians(30.0))
     assert other.reason is Reason.PASSED
 
 
 def test_a_boat_that_cannot_simply_stop_is_not_left_drifting_in():
     """Without a command and with another boat coming: a stop would be run down, so it gets out of the way."""
     fleet = head_on(7.0)
-    shield = Shield(adversary_s=0.0)
+    shield = Shield(adversary_horizon_s=0.0)
     decision = shield.decide(fleet, relative((math.nan, 0.0), (2.0, 0.0)))[0]
     assert decision.intervened
-    assert math.isfinite(decision.sent_speed_mps + decision.sent_heading_rad)
-    assert math.isnan(decision.wanted_speed_mps)
+    assert math.isfinite(decision.filtered_speed_mps + decision.filtered_heading_rad)
+    assert math.isnan(decision.nominal_speed_mps)
 
 
 def test_a_batch_holds_too():
@@ -109,8 +109,8 @@ def test_a_batch_takes_unknown_memory_as_a_single_shield_does(column):
     many = BatchedShield(config, 1, fleet.platforms, (0, 1))
     sent = many.decide(state[None], wanted.values[None], fleet.controlled[None])
     assert one.reason[0] == many.reason[0, 0] != Reason.PASSED
-    assert one.certificate_m[0] == pytest.approx(many.certificate_m[0, 0], abs=1e-9)
-    assert np.allclose(sent[0, 0], one.sent.values[0], atol=1e-6)
+    assert one.safety_margin_m[0] == pytest.approx(many.safety_margin_m[0, 0], abs=1e-9)
+    assert np.allclose(sent[0, 0], one.filtered.values[0], atol=1e-6)
     assert bits(state) == bits(fleet.state)
 
 
@@ -119,7 +119,7 @@ def test_a_batch_takes_unknown_memory_as_a_single_shield_does(column):
 def test_a_batch_never_answers_anything_but_numbers(seed, crowded, certificate):
     random = np.random.default_rng(seed)
     platforms = ("heron", "surveyor", "si", "di")
-    shield = BatchedShield(ShieldConfig(certificate=certificate), 3, platforms, (0, 0, 1, 0), HARBOUR)
+    shield = BatchedShield(ShieldConfig(opponent_model=certificate), 3, platforms, (0, 0, 1, 0), HARBOUR)
     state = np.zeros((3, 4, L.N_STATE))
     state[..., : L.Y + 1] = random.uniform(-4.0, 4.0, (3, 4, 2)) * (0.0 if crowded else 1.0)
     state[..., L.HEADING] = random.uniform(-180.0, 180.0, (3, 4))
@@ -127,4 +127,4 @@ def test_a_batch_never_answers_anything_but_numbers(seed, crowded, certificate):
     wanted = random.choice([0.0, 1.0, -3.0, 200.0, *BAD], (3, 4, 2))
     sent = shield.decide(state, wanted, np.ones((3, 4), bool))
     assert np.isfinite(sent).all()
-    assert not np.isnan(shield.certificate_m).any()
+    assert not np.isnan(shield.safety_margin_m).any()

@@ -60,7 +60,7 @@ def directly(laid):
 def answer(laid, fleet_of):
     shield = Shield(ShieldConfig(), FIELD)
     decisions = shield.decide(fleet_of(laid), Commands(laid(WANTED), False))
-    return bits(decisions.sent.values), decisions.reason.tolist(), decisions.certificate_m.tolist()
+    return bits(decisions.filtered.values), decisions.reason.tolist(), decisions.safety_margin_m.tolist()
 
 
 @pytest.mark.parametrize("fleet_of", [meeting, directly])
@@ -75,7 +75,7 @@ def test_no_layout_changes_a_decision_or_is_compiled_for(name, fleet_of):
 def test_commands_of_whole_numbers_are_mended_as_any():
     fleet = meeting(np.asarray)
     sent = [
-        Shield(separation_m=2.5).decide(fleet, commands).sent.values
+        Shield(separation_m=2.5).decide(fleet, commands).filtered.values
         for commands in (Commands(np.array([[2, 0], [2, 3]]), False), Commands.absolute_rad([[2.0, 0.0], [2.0, 3.0]]))
     ]
     assert bits(sent[0]) == bits(sent[1])

@@ -41,10 +41,10 @@ def test_the_order_of_a_fleet_changes_no_bit(seed, rows, platform):
     for turn in turns:
         told = one.decide(fleet, Commands.relative_deg(turn))
         again = other.decide(listed(fleet, rows), Commands.relative_deg(turn[list(rows)]))
-        for name in ("intervened", "reason", "certificate_m", "slack_m", "cut_short"):
+        for name in ("intervened", "reason", "safety_margin_m", "slack_m", "cut_short"):
             assert (getattr(told, name)[list(rows)] == getattr(again, name)).all(), name
-        assert (told.sent.values[list(rows)] == again.sent.values).all()
-        assert [told[i].binding for i in rows] == [d.binding for d in again]
+        assert (told.filtered.values[list(rows)] == again.filtered.values).all()
+        assert [told[i].active_constraints for i in rows] == [d.active_constraints for d in again]
         assert [told[i].boat for i in rows] == [d.boat for d in again]
 
 

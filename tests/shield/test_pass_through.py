@@ -22,8 +22,8 @@ def test_odd_numbers_pass_bit_for_bit(speed, heading):
     for make in (Commands.game_deg, *to_boats):
         wanted = make([[speed, heading], [1.0, 0.3], [speed, heading]])
         decisions = Shield().decide(far_apart(), wanted)
-        assert bits(decisions.sent.values) == bits(wanted.values)
-        assert decisions.sent.relative == wanted.relative
+        assert bits(decisions.filtered.values) == bits(wanted.values)
+        assert decisions.filtered.relative == wanted.relative
         assert not decisions.intervened.any()
         assert decisions.reason.tolist() == [Reason.PASSED, Reason.PASSED, Reason.NOT_COVERED]
 
@@ -37,11 +37,11 @@ def test_what_is_marked_passed_is_what_was_wanted_bit_for_bit(data):
     before = bits(wanted.values)
     decisions = Shield().decide(fleet, wanted)
     same = np.isin(decisions.reason, [Reason.PASSED, Reason.NOT_COVERED])
-    assert bits(wanted.values) == before, "the wanted commands were written to"
-    assert bits(decisions.sent.values[same]) == bits(wanted.values[same])
+    assert bits(wanted.values) == before, "the nominal commands were written to"
+    assert bits(decisions.filtered.values[same]) == bits(wanted.values[same])
     assert not decisions.intervened[same].any()
     unchanged = ~decisions.intervened
-    assert bits(decisions.sent.values[unchanged]) == bits(wanted.values[unchanged])
+    assert bits(decisions.filtered.values[unchanged]) == bits(wanted.values[unchanged])
 
 
 @quick
@@ -52,7 +52,7 @@ def test_a_boat_that_passes_is_certified(data):
     decisions = Shield().decide(fleet, Commands.relative_deg(data.draw(finite_commands(len(fleet)))))
     passed = decisions.reason == Reason.PASSED
     assume(passed.any())
-    assert (decisions.certificate_m[passed] >= 0.0).all()
+    assert (decisions.safety_margin_m[passed] >= 0.0).all()
 
 
 def test_a_boat_that_passed_takes_part_where_the_best_of_another_would_hit_it():
@@ -68,7 +68,7 @@ def test_a_boat_that_passed_takes_part_where_the_best_of_another_would_hit_it():
     decisions = Shield().decide(fleet, Commands.relative_deg(np.zeros((4, 2))))
     assert decisions[3].reason is Reason.BEST_EFFORT
     assert decisions[2].reason in (Reason.BACKUP, Reason.LEAST_CHANGE)
-    assert decisions[2].certificate_m >= 0.0
+    assert decisions[2].safety_margin_m >= 0.0
 
 
 @quick
@@ -79,37 +79,37 @@ def test_boats_not_controlled_get_what_they_were_given(data):
     values[~fleet.controlled] = [np.nan, np.inf]
     decisions = Shield().decide(fleet, Commands.relative_deg(values))
     others = ~fleet.controlled
-    assert bits(decisions.sent.values[others]) == bits(values[others])
+    assert bits(decisions.filtered.values[others]) == bits(values[others])
     assert (decisions.reason[others] == Reason.NOT_COVERED).all()
-    assert np.isinf(decisions.certificate_m[others]).all()
+    assert np.isinf(decisions.safety_margin_m[others]).all()
 
 
 def test_only_the_boat_in_danger_is_changed():
     """A head-on far from a third boat of ours, whose odd command must pass while the first one's is changed."""
     fleet = fleet_of([(0, 0, 0, 2.0), (0, 5.2, 180, 2.0), (300, 0, 0, 1.0)], [0, 1, 0])
     wanted = relative((2.0, 0.0), (2.0, 0.0), (-0.0, 5e-324))
-    decisions = Shield(adversary_s=0.0).decide(fleet, wanted)
+    decisions = Shield(adversary_horizon_s=0.0).decide(fleet, wanted)
     assert decisions.intervened.tolist() == [True, False, False]
-    assert bits(decisions.sent.values[1:]) == bits(wanted.values[1:])
-    assert np.isfinite(decisions.sent.values).all()
+    assert bits(decisions.filtered.values[1:]) == bits(wanted.values[1:])
+    assert np.isfinite(decisions.filtered.values).all()
 
 
 @pytest.mark.parametrize("coordination", ["team", "per_boat"])
 def test_a_change_is_made_in_the_frame_of_the_wanted_command(coordination):
     fleet = head_on(5.2)
-    shield = Shield(adversary_s=0.0, coordination=coordination)
+    shield = Shield(adversary_horizon_s=0.0, coordination=coordination)
     turned = shield.decide(fleet, relative((2.0, 0.0), (2.0, 0.0)))
     shield.reset()
     absolute = shield.decide(fleet, Commands.absolute_rad([[2.0, 0.0], [2.0, np.pi]]))
     assert turned.intervened[0]
     assert absolute.intervened[0]
-    for field in ("sent_speed_mps", "sent_heading_rad", "certificate_m"):
+    for field in ("filtered_speed_mps", "filtered_heading_rad", "safety_margin_m"):
         assert getattr(turned[0], field) == pytest.approx(getattr(absolute[0], field), abs=1e-9)
 
 
 def test_a_step_of_the_class_k_rate_is_no_excuse_to_touch_a_far_boat():
     """A finite response rate asks margins to shrink slowly; margins above the cap are left alone."""
-    decisions = Shield(response_per_s=0.5).decide(far_apart(), relative((2.0, 0.0), (2.0, 0.0), (0.0, 0.0)))
+    decisions = Shield(cbf_rate_per_s=0.5).decide(far_apart(), relative((2.0, 0.0), (2.0, 0.0), (0.0, 0.0)))
     assert not decisions.intervened.any()
 
 
@@ -123,9 +123,9 @@ def test_an_opponent_that_comes_astern_is_one_that_comes(platform, gap_m, speed_
         for heading, speed in ((180.0, speed_mps), (0.0, -speed_mps))
     )
     assert ahead[0].reason == astern[0].reason
-    assert ahead[0].certificate_m < 0.2
-    np.testing.assert_allclose(ahead.sent.values, astern.sent.values, atol=1e-9)
-    assert ahead[0].certificate_m == pytest.approx(astern[0].certificate_m, abs=1e-9)
+    assert ahead[0].safety_margin_m < 0.2
+    np.testing.assert_allclose(ahead.filtered.values, astern.filtered.values, atol=1e-9)
+    assert ahead[0].safety_margin_m == pytest.approx(astern[0].safety_margin_m, abs=1e-9)
 
 
 @pytest.mark.parametrize(("gap_m", "speed_mps"), [(9.0, 2.0), (20.0, 8.0), (30.0, 20.0)])
@@ -135,5 +135,5 @@ def test_in_a_batch_an_opponent_that_comes_astern_is_one_that_comes(platform, ga
     wanted, batch = [(1.5, 0.0), (1.0, 9.0)], BatchedShield(ShieldConfig(), 1, (platform,) * 2, (0, 1))
     sent = batch.decide(fleet.state[None], np.array(wanted)[None], np.array([[True, False]]))[0]
     single = Shield().decide(fleet, relative(*wanted))
-    np.testing.assert_allclose(sent, single.sent.values, atol=1e-6)
-    assert batch.certificate_m[0, 0] == pytest.approx(single[0].certificate_m, abs=1e-9)
+    np.testing.assert_allclose(sent, single.filtered.values, atol=1e-6)
+    assert batch.safety_margin_m[0, 0] == pytest.approx(single[0].safety_margin_m, abs=1e-9)

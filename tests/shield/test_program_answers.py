@@ -1,4 +1,4 @@
-"""Answers of the program are sent: between team-mates, seldom, and only such as keep what the backups keep."""
+"""Answers of the program are sent: between teammates, seldom, and only such as keep what the backups keep."""
 
 import numpy as np
 from shield_loops import sail, scattered
@@ -18,6 +18,6 @@ def test_answers_are_sent_between_team_mates_and_none_comes_too_near():
         by_program = run.solver == SOLVERS.index("qp")
         assert (run.reason[by_program] == Reason.LEAST_CHANGE).all()
         answered += by_program.sum()
-        assert (run.certificate_m[by_program] >= 0.0).all()
+        assert (run.safety_margin_m[by_program] >= 0.0).all()
         assert (np.abs(run.sent - wants).max(axis=-1)[by_program] > 0.0).all()
     assert answered > 5

@@ -31,7 +31,7 @@ def fleet_of_rows(state, team, platform):
 def test_team_mates_that_may_hardly_search_keep_their_distance(platform, top_mps):
     state = on_a_circle(6, 40.0, top_mps)
     straight = np.tile([top_mps, 0.0], (6, 1))
-    run = sail(Shield(search_limit=LEAST), fleet_of_rows(state, [0] * 6, platform), lambda *_: straight, 350)
+    run = sail(Shield(work_budget=LEAST), fleet_of_rows(state, [0] * 6, platform), lambda *_: straight, 350)
     assert (run.reason != Reason.PASSED).any()
     assert distances(run.position).min() >= 2.5
 
@@ -44,18 +44,18 @@ def crowd(seed):
 
 def test_it_is_told_that_the_search_was_cut_short():
     fleet, wanted = crowd(1)
-    cut = Shield(search_limit=LEAST).decide(fleet, wanted)
-    free = Shield(search_limit=np.inf).decide(fleet, wanted)
+    cut = Shield(work_budget=LEAST).decide(fleet, wanted)
+    free = Shield(work_budget=np.inf).decide(fleet, wanted)
     assert [d.cut_short for d in cut] == [True] * 12 + [False] * 8  # never of boats that are not decided for
     assert not any(d.cut_short for d in free)
-    assert np.isfinite(cut.sent.values).all()
+    assert np.isfinite(cut.filtered.values).all()
 
 
 def test_no_decision_costs_much_more_than_its_limit():
     """Beyond it each boat is laid and checked a bounded number of times, however many manoeuvres there are."""
     spent = {}
     for limit in (LEAST, np.inf):
-        shield = Shield(search_limit=limit)
+        shield = Shield(work_budget=limit)
         shield.decide(*crowd(1))
         spent[limit] = shield._deciders.scene.spent[0]
     once = 12 * (PATH_COST + 19.0 + 8 * PURSUER_COST)
@@ -69,7 +69,7 @@ def test_ordinary_decisions_do_not_come_near_the_limit():
     state = scattered(np.random.default_rng(2), 6, platforms, 20.0)
     runs = [
         sail_games(ShieldConfig(**one), state.copy(), platforms, team, Wander(3, 6, platforms), 100)
-        for one in ({}, {"search_limit": np.inf})
+        for one in ({}, {"work_budget": np.inf})
     ]
     assert (runs[0].sent == runs[1].sent).all()
     assert (runs[0].reason != Reason.PASSED).any()
@@ -79,7 +79,7 @@ def test_ordinary_decisions_do_not_come_near_the_limit():
 def test_a_batch_is_cut_short_as_single_decisions_are(limit):
     platforms, team = ["heron"] * 6, [0, 0, 0, 1, 1, 1]
     state = scattered(np.random.default_rng(4), 3, platforms, 16.0)
-    config = ShieldConfig(search_limit=limit)
+    config = ShieldConfig(work_budget=limit)
     run = sail_games(config, state.copy(), platforms, team, Wander(5, 3, platforms), 40)
     for game in range(3):
         wander = Wander(5, 3, platforms)
@@ -94,8 +94,8 @@ def test_a_batch_is_cut_short_as_single_decisions_are(limit):
 
 @pytest.mark.parametrize("limit", [0.0, -1.0, 999.0, np.nan, "much", None])
 def test_a_limit_that_is_none_is_refused(limit):
-    with pytest.raises(ConfigError, match="search_limit"):
-        Shield(search_limit=limit)
+    with pytest.raises(ConfigError, match="work_budget"):
+        Shield(work_budget=limit)
 
 
 def crowded_edge(random, x_m):
@@ -111,7 +111,7 @@ def crowded_edge(random, x_m):
 
 
 def test_who_backs_up_when_the_search_is_over_is_not_sent_what_it_wanted():
-    """Though team-mates have just joined, and not all have a manoeuvre from where they are."""
+    """Though teammates have just joined, and not all have a manoeuvre from where they are."""
     backed_up = 0
     for seed in range(25):
         random = np.random.default_rng(seed)
@@ -121,7 +121,7 @@ def test_who_backs_up_when_the_search_is_over_is_not_sent_what_it_wanted():
             error = (np.array(courses) - state[:, L.HEADING] + 180.0) % 360.0 - 180.0
             return np.stack([np.full(len(state), 2.0), error], axis=-1)
 
-        config, around = ShieldConfig(search_limit=LEAST, edge_m=0.2), Surroundings(field=(0.0, 0.0, 900.0, 80.0))
+        config, around = ShieldConfig(work_budget=LEAST, edge_m=0.2), Surroundings(field=(0.0, 0.0, 900.0, 80.0))
         run = sail(Shield(config, around), fleet_of_rows(np.array(rows), team, "heron"), wanted, 100)
         backs_up = (run.reason == Reason.BACKUP) & run.cut_short
         backed_up += backs_up.sum()
@@ -142,9 +142,9 @@ def test_a_search_that_is_cut_short_does_not_lose_the_plan_there_was():
             error = ((middle if step < 60 else away) - state[:, L.HEADING] + 180.0) % 360.0 - 180.0
             return np.stack([np.full(12, 2.0), error], axis=-1)
 
-        run = sail(Shield(search_limit=LEAST), fleet_of_rows(state, [0] * 12, "heron"), wanted, 150)
+        run = sail(Shield(work_budget=LEAST), fleet_of_rows(state, [0] * 12, "heron"), wanted, 150)
         assert run.closest(np.ones(12, bool)).min() >= 2.5
-        safe = run.certificate_m.min(axis=-1) >= 0.0
+        safe = run.safety_margin_m.min(axis=-1) >= 0.0
         lost += (safe[:-1] & ~safe[1:]).sum()
         cut += run.cut_short.any(axis=-1).sum()
     assert cut > 300

@@ -18,24 +18,24 @@ NOT_ZERO = [
     "move_s",
     "separation_m",
     "dt_s",
-    "response_per_s",
-    "table_response_per_s",
-    "fixed_response_per_s",
-    "give_way_after_s",
-    "search_limit",
+    "cbf_rate_per_s",
+    "table_cbf_rate_per_s",
+    "static_cbf_rate_per_s",
+    "deadlock_timeout_s",
+    "work_budget",
     "speed_weight",
     "horizon_s",
 ]
-MAY_BE_NONE = ["adversary_s", "visitor_s", "move_s", "horizon_s", "edge_m", "beyond_m"]
+MAY_BE_NONE = ["adversary_horizon_s", "intruder_horizon_s", "move_s", "horizon_s", "edge_m", "beyond_m"]
 MAY_BE_INFINITE = [
-    "adversary_s",
-    "visitor_s",
-    "response_per_s",
-    "table_response_per_s",
-    "fixed_response_per_s",
-    "give_way_after_s",
+    "adversary_horizon_s",
+    "intruder_horizon_s",
+    "cbf_rate_per_s",
+    "table_cbf_rate_per_s",
+    "static_cbf_rate_per_s",
+    "deadlock_timeout_s",
     "max_track_age_s",
-    "search_limit",
+    "work_budget",
 ]
 
 
@@ -81,10 +81,13 @@ def test_none_means_off_only_where_it_says_so(name):
 
 def test_profiles_are_names_of_the_time_opponents_are_feared_for():
     told = {name: ShieldConfig(profile=name) for name in PROFILES}
-    assert {name: (config.feared_s, config.visitor_feared_s) for name, config in told.items()} == PROFILES
-    assert ShieldConfig(profile="rammers", adversary_s=5.0).feared_s == 5.0
+    assert {
+        name: (config.effective_adversary_horizon_s, config.effective_intruder_horizon_s)
+        for name, config in told.items()
+    } == PROFILES
+    assert ShieldConfig(profile="ramming", adversary_horizon_s=5.0).effective_adversary_horizon_s == 5.0
     with pytest.raises(ConfigError, match="unknown profile 'players!'; choose one of players, rammers, hold-course"):
-        ShieldConfig(profile="players!")
+        ShieldConfig(profile="competitive!")
 
 
 @pytest.mark.parametrize("name", TEXTS)
@@ -155,10 +158,10 @@ def test_all_errors_are_of_one_tree():
 
 
 @settings(max_examples=60, deadline=None, derandomize=True)
-@given(separation=st.floats(0.01, 50.0), fear=st.floats(0.0, 200.0), certificate=st.sampled_from(list(CERTIFICATES)))
+@given(separation=st.floats(0.01, 50.0), fear=st.floats(0.0, 200.0), opponent_model=st.sampled_from(list(CERTIFICATES)))
 def test_sensible_settings_are_taken_as_given(separation, fear, certificate):
-    config = ShieldConfig.of(separation_m=separation, adversary_s=fear, certificate=certificate)
-    assert (config.separation_m, config.adversary_s, config.certificate) == (separation, fear, certificate)
+    config = ShieldConfig.of(separation_m=separation, adversary_horizon_s=fear, opponent_model=certificate)
+    assert (config.separation_m, config.adversary_horizon_s, config.opponent_model) == (separation, fear, certificate)
     assert Shield(config).config is config
 
 
@@ -168,11 +171,13 @@ def test_numbers_no_float_holds_are_refused():
 
 
 def test_whole_numbers_are_kept_as_floats_for_compiled_code():
-    config = ShieldConfig(separation_m=3, margin_cap_m=0, response_per_s=1, horizon_s=6, edge_m=None, hull_m=1)
+    config = ShieldConfig(
+        separation_m=3, margin_cap_m=0, cbf_rate_per_s=1, horizon_s=6, edge_m=None, obstacle_clearance_m=1
+    )
     numbers = [value for value in vars(config).values() if not isinstance(value, str | tuple) and value is not None]
     assert {type(value) for value in numbers} == {float}
     assert config == ShieldConfig(
-        separation_m=3.0, margin_cap_m=0.0, response_per_s=1.0, horizon_s=6.0, edge_m=None, hull_m=1.0
+        separation_m=3.0, margin_cap_m=0.0, cbf_rate_per_s=1.0, horizon_s=6.0, edge_m=None, obstacle_clearance_m=1.0
     )
 
 
@@ -182,12 +187,12 @@ def test_whole_numbers_are_kept_as_floats_for_compiled_code():
         ("dt_s", 100),
         ("dt_s", 1e-9),
         ("horizon_s", 121.0),
-        ("tail_s", 1e4),
+        ("straight_horizon_s", 1e4),
         ("delay_s", 1e4),
         ("margin_cap_m", 51),
         ("separation_m", 2500),
         ("position_error_m", 1e6),
-        ("hull_m", 1000),
+        ("obstacle_clearance_m", 1000),
         ("buffer_m", 50.1),
         ("edge_m", 201),
         ("table_margin_m", 450),
@@ -206,7 +211,7 @@ def test_what_nothing_can_be_decided_for_is_refused(name, value):
         ("current_mps", 300, r"300 \(if that is mm/s, give 0.3\); give 0 to 10 m/s"),
         ("track_error_mps", 51, "51; give 0 to 50 m/s$"),
         ("speed_weight", 1e7, r"10000000.0; give more than 0 and at most 1e\+06$"),
-        ("search_limit", 10, "10; give 1000 to inf clearances$"),
+        ("work_budget", 10, "10; give 1000 to inf clearances$"),
     ],
 )
 def test_a_number_of_another_unit_is_told_its_range_and_what_it_may_be(name, value, text):

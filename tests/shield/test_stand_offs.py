@@ -12,7 +12,7 @@ GOAL_M = {"heron": 30.0, "surveyor": 72.0}
 STEPS = {"heron": 450, "surveyor": 600}
 COMES = {"heron": (-13.5, 6.75, 60.0, 1.96), "surveyor": (-33.0, 27.7, 53.0, 2.45)}
 """Opponents that come from the left: east and north, m, heading, deg, speed, m/s."""
-CAP_M = ShieldConfig().mate_cap_m
+CAP_M = ShieldConfig().teammate_margin_cap_m
 
 
 def crossing(platform):
@@ -65,7 +65,12 @@ def test_margins_from_team_mates_shrink_freely_until_they_are_small():
     top, closest, changed = 2.0, [], []
     for cap_m in (CAP_M, ShieldConfig().margin_cap_m):
         fleet = fleet_of([(0.0, 0.0, 0.0, top), (2.4, 40.0, 180.0, top)], [0, 0], "heron")
-        run = sail(Shield(ShieldConfig(mate_cap_m=cap_m)), fleet, lambda step, state: np.tile([top, 0.0], (2, 1)), 220)
+        run = sail(
+            Shield(ShieldConfig(teammate_margin_cap_m=cap_m)),
+            fleet,
+            lambda step, state: np.tile([top, 0.0], (2, 1)),
+            220,
+        )
         closest.append(run.closest(np.ones(2, bool)))
         changed.append((run.reason != Reason.PASSED).sum())
     assert closest[0] >= 2.5
@@ -74,10 +79,10 @@ def test_margins_from_team_mates_shrink_freely_until_they_are_small():
 
 
 def test_boats_that_cannot_talk_keep_the_rate_of_others():
-    """What team-mates will do is only known where one program decides for all."""
+    """What teammates will do is only known where one program decides for all."""
     runs = []
     for cap_m in (CAP_M, ShieldConfig().margin_cap_m):
-        config = ShieldConfig(coordination="per_boat", mate_cap_m=cap_m)
+        config = ShieldConfig(coordination="per_boat", teammate_margin_cap_m=cap_m)
         fleet = fleet_of([(0.0, 0.0, 0.0, 2.0), (1.0, 40.0, 180.0, 2.0)], [0, 0], "heron")
         runs.append(sail(Shield(config), fleet, lambda step, state: np.tile([2.0, 0.0], (2, 1)), 220))
     np.testing.assert_array_equal(runs[0].sent, runs[1].sent)
@@ -85,7 +90,7 @@ def test_boats_that_cannot_talk_keep_the_rate_of_others():
 
 
 def test_of_a_command_changed_for_an_edge_the_edge_is_told():
-    """Also where the program or the eased backup found what keeps it, and a team-mate is the nearest boat then."""
+    """Also where the program or the eased backup found what keeps it, and a teammate is the nearest boat then."""
     field = Surroundings(field=(0.0, 0.0, 80.0, 40.0))
     fleet = fleet_of([(40.0, 34.0, 10.0, 2.0), (30.0, 10.0, 0.0, 0.0)], [0, 0], "heron")
     shield, state, told = Shield(), fleet.state.copy(), []
@@ -95,8 +100,8 @@ def test_of_a_command_changed_for_an_edge_the_edge_is_told():
         error = (10.0 - state[0, L.HEADING] + 180.0) % 360.0 - 180.0
         decisions = shield.decide(now, Commands.relative_deg([(2.0, error), (0.0, 0.0)]), field)
         found = decisions[0]
-        told += [found.binding] if found.intervened else []
-        step_all(packed(fleet.platforms), state[None], decisions.sent.values[None], 0.1)
+        told += [found.active_constraints] if found.intervened else []
+        step_all(packed(fleet.platforms), state[None], decisions.filtered.values[None], 0.1)
     assert len(told) > 20
     assert set(told) == {("field",)}
 
@@ -132,7 +137,7 @@ def test_a_boat_that_is_handed_over_while_it_gives_way_holds_nobody_up():
             given = step
         if by_hand:
             ruled.append(decisions.reason[1])
-        step_all(packed(both.platforms), state[None], decisions.sent.values[None], 0.1)
+        step_all(packed(both.platforms), state[None], decisions.filtered.values[None], 0.1)
         gap = np.hypot(*(state[0, :2] - state[1, :2]))
         assert gap >= 2.5
     assert given is not None
@@ -156,12 +161,12 @@ def test_an_opponent_that_is_overtaken_is_passed():
 
 @pytest.mark.parametrize(
     "settings",
-    [{"position_error_m": 0.1}, {"delay_s": 0.3}, {"current_mps": 0.2}, {"adversary_s": 0.0}],
+    [{"position_error_m": 0.1}, {"delay_s": 0.3}, {"current_mps": 0.2}, {"adversary_horizon_s": 0.0}],
 )
 def test_where_nothing_is_exact_or_feared_team_mates_are_as_others(settings):
     runs = []
     for cap_m in (CAP_M, ShieldConfig().margin_cap_m):
-        config = ShieldConfig(mate_cap_m=cap_m, **settings)
+        config = ShieldConfig(teammate_margin_cap_m=cap_m, **settings)
         fleet = fleet_of([(0.0, 0.0, 0.0, 2.0), (1.0, 40.0, 180.0, 2.0)], [0, 0], "heron")
         runs.append(sail(Shield(config), fleet, lambda step, state: np.tile([2.0, 0.0], (2, 1)), 150))
     np.testing.assert_array_equal(runs[0].sent, runs[1].sent)

@@ -47,7 +47,7 @@ def test_a_pursued_boat_goes_round_the_circle(name, top, gap_m):
     first = None
     for _ in range(STEPS):
         sent = shield.decide(state, chase(state, top), ours)
-        first = shield.certificate_m[:, 0].copy() if first is None else first
+        first = shield.safety_margin_m[:, 0].copy() if first is None else first
         before = state[:, 0, :2].copy()
         step_all(params, state, sent, 0.1)
         for b in range(GAMES):

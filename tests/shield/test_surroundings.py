@@ -50,7 +50,7 @@ def test_lists_and_arrays_will_do():
 
 def test_packing_widens_by_the_distances_of_the_settings():
     static = Surroundings((0, 0, 40, 20), [(1, 2, 3)], [TRIANGLE], [(5, 5, 2)], [(7, 7, 3)]).pack(
-        ShieldConfig(edge_m=0.5, hull_m=1.5)
+        ShieldConfig(edge_m=0.5, obstacle_clearance_m=1.5)
     )
     assert static.field.tolist() == [0.5, 0.5, 39.5, 19.5]
     assert static.circles.tolist() == [[1.0, 2.0, 4.5], [7.0, 7.0, 3.0]]  # a circle that stops boats has no hull

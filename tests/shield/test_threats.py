@@ -1,4 +1,4 @@
-"""What is feared of opponents is kept by a condition of its own: beside a team-mate, and of each opponent."""
+"""What is feared of opponents is kept by a condition of its own: beside a teammate, and of each opponent."""
 
 import math
 
@@ -19,7 +19,7 @@ def remembered(rows, team, platform):
     """Margins kept after one decision of boats that want to go straight on, and the next decision's targets."""
     fleet = fleet_of(rows, team, platform)
     fleet.state[:, L.THRUST] = 100.0
-    shield = Shield(profile="rammers")
+    shield = Shield(profile="ramming")
     decisions = shield.decide(fleet, relative(*[(row[3], 0.0) for row in rows]))
     scene = shield._deciders.scene
     set_targets(scene)
@@ -30,11 +30,11 @@ def remembered(rows, team, platform):
 def test_a_team_mate_close_by_does_not_hide_the_fear(platform, top, ahead_m):
     rows = [(0, 0, 0, top), (2.7, 0, 0, top), (0, ahead_m, 180, top)]
     decisions, memory, scene = remembered(rows, [0, 0, 1], platform)
-    assert decisions.certificate_m[0] < 0.2  # of the team-mate
-    assert memory[0, 2] > decisions.certificate_m[0] + 0.1
+    assert decisions.safety_margin_m[0] < 0.2  # of the teammate
+    assert memory[0, 2] > decisions.safety_margin_m[0] + 0.1
     decay = math.exp(-0.1 * (0.3 if platform == "surveyor" else 1.0))
     assert scene.threat_target_m[0, 2] == pytest.approx(decay * min(memory[0, 2], CAP_M))
-    assert scene.target[0] == pytest.approx(decay * decisions.certificate_m[0])
+    assert scene.target[0] == pytest.approx(decay * decisions.safety_margin_m[0])
 
 
 def test_each_opponent_that_is_looked_up_has_its_own():

@@ -35,7 +35,7 @@ def closest(name, seed, **gains):
         )
         wanted = wander(step, state[None])[0]
         course = np.radians(state[:, L.HEADING] + wanted[:, 1])
-        sent = shield.decide(fleet, Commands.absolute_rad(np.stack([wanted[:, 0], course], axis=1))).sent
+        sent = shield.decide(fleet, Commands.absolute_rad(np.stack([wanted[:, 0], course], axis=1))).filtered
         step_all(params, state[None], sent.as_relative_deg(state[:, L.HEADING])[None], 0.1)
         nearest = min(nearest, distances(state[:, : L.Y + 1]).min())
     return nearest

@@ -47,10 +47,10 @@ def test_decisions_are_the_same_with_and_without(coordination):
     for warm in (False, True):
         guard = Shield(coordination=coordination, delay_s=0.2)
         fleet, wanted = head_on()
-        before = [guard.decide(fleet, wanted).sent.values]
+        before = [guard.decide(fleet, wanted).filtered.values]
         if warm:
             guard.warm_up(fleet)
-        before += [guard.decide(fleet, wanted).sent.values for _ in range(3)]
+        before += [guard.decide(fleet, wanted).filtered.values for _ in range(3)]
         told.append(np.array(before))
     np.testing.assert_array_equal(*told)
 

@@ -135,7 +135,7 @@ class TeamShield:
         try:
             fleet = fleet_of(self._spec, observed, self._team, self._disabled_s)
             with np.errstate(all="ignore"):  # as compiled code, which divides by zero and goes on
-                sent = self._shield.decide(fleet, Commands.game_deg(wanted), self._around).sent.values
+                sent = self._shield.decide(fleet, Commands.game_deg(wanted), self._around).filtered.values
         except Exception as error:  # whatever it is, boats that nobody decides for must stop
             text = describe_error(error)
             self.failures = dict.fromkeys(self._places, (UNDECIDED, text))

@@ -21,7 +21,7 @@ class GridProblem:
         carrying: whether it has the flag.
         flag: cells from which the flag is grabbed.
         own: columns below this one are the own zone.
-        blocked: cells of team-mates.
+        blocked: cells of teammates.
         watched: cells in which an opponent makes contact.
     """
 

@@ -24,7 +24,7 @@ CONTACT_SHARES = (2.0, 1.6, 1.3, 1.0, 0.8)
 hence more than the radius where there is room; less than it is a gamble, taken where all else is shut."""
 CIRCLE_DEG = 45.0
 CIRCLE_SHARE = 0.5
-"""Of top speed, at which team-mates sail their circles."""
+"""Of top speed, at which teammates sail their circles."""
 PLANNERS = ("auto", "pddl", "astar")
 
 

@@ -132,7 +132,7 @@ def put_back(message: Any, entries: Any) -> None:
 
 
 def tick_to_json(tick: Tick, platforms: Mapping[str, Platform]) -> dict[str, Any]:
-    """The tick as its message; wanted commands without a fleet mean nothing and are left out.
+    """The tick as its message; nominal commands without a fleet mean nothing and are left out.
 
     Args:
         tick: the tick.
@@ -150,7 +150,7 @@ def tick_to_json(tick: Tick, platforms: Mapping[str, Platform]) -> dict[str, Any
         "has_wanted": fleet is not None and tick.wanted is not None,
         "has_decisions": decisions is not None,
         "wanted_relative": tick.wanted is not None and tick.wanted.relative,
-        "sent_relative": decisions is not None and decisions.sent.relative,
+        "sent_relative": decisions is not None and decisions.filtered.relative,
         "solve_time_s": 0.0 if decisions is None else float(decisions.solve_time_s),
         "boats": [] if fleet is None else _boats(fleet, tick.wanted, decisions, platforms),
         "surroundings": [] if tick.surroundings is None else [_surroundings(tick.surroundings)],
@@ -180,9 +180,10 @@ def _boats(
     if wanted is not None:
         columns["wanted"] = wanted.values.tolist()
     if decisions is not None:
-        columns["sent"] = decisions.sent.values.tolist()
+        columns["sent"] = decisions.filtered.values.tolist()
         columns["why"] = [Reason(int(reason)).name for reason in decisions.reason]
-        for name in ("intervened", "reason", "certificate_m", "slack_m", "bound", "cut_short", "solver"):
+        columns["certificate_m"] = decisions.safety_margin_m.tolist()  # the name that logs have had since 0.2.0
+        for name in ("intervened", "reason", "slack_m", "bound", "cut_short", "solver"):
             if getattr(decisions, name) is not None:
                 columns[name] = getattr(decisions, name).tolist()
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
@@ -264,14 +265,14 @@ def _tick(record: TickRecord, platforms: Mapping[str, Platform]) -> Tick:
         whole = [_column(rows, name, np.int64) for name in ("reason", "bound")]
         if any(column is None for column in (*floats, *whole)) and rows:
             raise LogError("a decision lacks a value; it is damaged or of another version")
-        certificate_m, slack_m, reason, bound = (np.array([]) if c is None else c for c in (*floats, *whole))
+        safety_margin_m, slack_m, reason, bound = (np.array([]) if c is None else c for c in (*floats, *whole))
         decisions = Decisions(
             fleet=fleet,
-            wanted=wanted,
-            sent=Commands(_table(rows, "sent", 2), record.sent_relative),
+            nominal=wanted,
+            filtered=Commands(_table(rows, "sent", 2), record.sent_relative),
             intervened=np.array([row.intervened is True for row in rows], dtype=np.bool_),
             reason=reason,
-            certificate_m=certificate_m,
+            safety_margin_m=safety_margin_m,
             slack_m=slack_m,
             bound=bound,
             cut_short=_column(rows, "cut_short", np.bool_),

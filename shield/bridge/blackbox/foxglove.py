@@ -165,7 +165,7 @@ def _boat(fleet: Fleet, decisions: Decisions | None, i: int, time_ns: int, separ
     if decisions is not None and fleet.controlled[i]:
         arrows += _commands(decisions, i, x_m, y_m)
         discs = [disc(pose(x_m, y_m), separation_m, {**paint, "a": _ALPHA})]
-        text = f"{text} {Reason(int(decisions.reason[i])).name} {decisions.certificate_m[i]:.1f} m"
+        text = f"{text} {Reason(int(decisions.reason[i])).name} {decisions.safety_margin_m[i]:.1f} m"
     texts = [label(x_m, y_m, text, paint)]
     return entity(time_ns, fleet.names[i], _LIFETIME_S, arrows=arrows, cylinders=discs, texts=texts)
 
@@ -176,8 +176,8 @@ def _commands(decisions: Decisions, i: int, x_m: float, y_m: float) -> list[Mess
     changed = bool(decisions.intervened[i])
     arrows = []
     for commands, paint, width_m in (
-        (decisions.wanted, _WANTED, 0.25),
-        (decisions.sent, _CHANGED if changed else _SENT, 0.15),
+        (decisions.nominal, _WANTED, 0.25),
+        (decisions.filtered, _CHANGED if changed else _SENT, 0.15),
     ):
         speed_mps, heading_rad = commands.absolute(i, own_rad)
         if math.isfinite(speed_mps) and math.isfinite(heading_rad) and 0.05 < abs(speed_mps) < 100.0:

@@ -255,8 +255,8 @@ def _snapshot(tick: Tick) -> Tick:
     fleet, wanted, decisions = _copied(tick.fleet), tick.wanted, tick.decisions
     wanted = None if wanted is None else _copied(wanted)
     if decisions is not None and wanted is not None:
-        sent = wanted if decisions.sent is tick.wanted else _copied(decisions.sent)
-        decisions = replace(_copied(decisions), fleet=fleet, wanted=wanted, sent=sent)
+        sent = wanted if decisions.filtered is tick.wanted else _copied(decisions.filtered)
+        decisions = replace(_copied(decisions), fleet=fleet, nominal=wanted, filtered=sent)
     return replace(tick, fleet=fleet, wanted=wanted, decisions=None if wanted is None else decisions)
 
 

@@ -39,10 +39,10 @@ def test_boats_of_others_are_left_alone_and_reset_forgets(name):
     assert sent[0, 1].tobytes() == wanted[0, 1].tobytes()
     assert (sent[0, 0] != wanted[0, 0]).any()
     assert guard.reason[0, 0] > 0
-    assert np.isinf(guard.certificate_m[0, 1])
+    assert np.isinf(guard.safety_margin_m[0, 1])
     guard.reset(np.array([True]))
     assert (guard.reason == 0).all()
-    assert np.isinf(guard.certificate_m).all()
+    assert np.isinf(guard.safety_margin_m).all()
     assert (guard.memory == guard.forgotten).all()
     assert guard.decide(state, wanted, ours).tobytes() == sent.tobytes()
 
@@ -87,7 +87,7 @@ def test_what_is_not_a_number_never_passes(name, bad):
     if name in HOLDS:
         assert guard.decide(state, wanted, ours)[0, 0].tolist() == [0.0, 0.0]
         return
-    with pytest.raises(FleetError, match="wanted command"):
+    with pytest.raises(FleetError, match="nominal command"):
         guard.decide(state, wanted, ours)
 
 
@@ -115,9 +115,9 @@ def test_a_fleet_that_does_not_fit_is_refused(name):
         ("keeper", "unknown guard 'keeper'; choose from none, shield"),
         ("none:a=1", "takes no settings"),
         ("shield:tail", "has no value"),
-        ("shield:tial_s=3", "did you mean 'tail_s'"),
+        ("shield:tial_s=3", "did you mean 'straight_horizon_s'"),
         ("parabolic:a=1", "takes no settings; only shield, reach, gatekeeper"),
-        ("reach:tail_s=3", "has no setting 'tail_s'"),
+        ("reach:straight_horizon_s=3", "has no setting 'straight_horizon_s'"),
         ("reach:buffer_m=-1", "must be >= 0"),
         ("gatekeeper:horizon=3", "no setting 'horizon'; it knows horizon_s, switch_s"),
         ("gatekeeper:horizon_s=0", "at least 0.1, at most 60"),
@@ -137,5 +137,5 @@ def test_bad_names_and_settings_are_refused(text, words):
 
 
 def test_settings_are_read_from_the_name():
-    names = ["none", "reach:response_per_s=0.5,buffer_m=1", "gatekeeper:horizon_s=6,switch_s=2", "pl-cbf"]
+    names = ["none", "reach:cbf_rate_per_s=0.5,buffer_m=1", "gatekeeper:horizon_s=6,switch_s=2", "pl-cbf"]
     assert parse_guards(",".join(names)) == names

@@ -31,7 +31,7 @@ guard_params = guard_for("reach", scene((0, 0, 0), (0, 50, 180), (50, 0, 0))).pa
 
 
 def test_certificate_is_the_value_after_the_step():
-    """A team-mate not decided for keeps its course for the step; the rest is the table's."""
+    """A teammate not decided for keeps its course for the step; the rest is the table's."""
     state, ours = scene((0, 0, 0), (4, 9, -120)), np.array([[True, False]])
     guard = guard_for("reach", state, team=(0, 0))
     wanted = ahead(state)
@@ -43,18 +43,18 @@ def test_certificate_is_the_value_after_the_step():
     place, angles = other[:2] - own[:2], np.radians([own[L.HEADING], other[L.HEADING]])
     value = table_value(tables, 0, WHOLE_S, *place, *angles, own[L.SPEED], other[L.SPEED])
     assert guard.reason.tolist() == [[PASSED, NOT_COVERED]]
-    assert guard.certificate_m[0, 0] == pytest.approx(value - 2.55, abs=1e-3)
-    assert np.isinf(guard.certificate_m[0, 1])
+    assert guard.safety_margin_m[0, 0] == pytest.approx(value - 2.55, abs=1e-3)
+    assert np.isinf(guard.safety_margin_m[0, 1])
 
 
 def test_the_longer_an_opponent_is_feared_the_less_is_left():
     state, ours = scene((0, 0, 0), (5, 5, -90)), np.array([[True, False]])
     margins = []
-    for adversary_s in (1.0, 3.0, np.inf):
-        guard = guard_for("reach", state, config=ShieldConfig(adversary_s=adversary_s))
+    for adversary_horizon_s in (1.0, 3.0, np.inf):
+        guard = guard_for("reach", state, config=ShieldConfig(adversary_horizon_s=adversary_horizon_s))
         guard.decide(state, ahead(state), ours)
         assert guard.reason[0, 0] == PASSED
-        margins.append(guard.certificate_m[0, 0])
+        margins.append(guard.safety_margin_m[0, 0])
     assert margins[0] > margins[1] >= margins[2]
 
 
@@ -97,7 +97,7 @@ def test_an_escape_keeps_its_side_until_it_is_forgotten():
     kept = guard.decide(mirrored, ahead(state), ours)[0, 0, 1]
     guard.reset(np.array([True]))
     assert (guard.reason == 0).all()
-    assert np.isinf(guard.certificate_m).all()
+    assert np.isinf(guard.safety_margin_m).all()
     fresh = guard.decide(mirrored, ahead(state), ours)[0, 0, 1]
     assert first * kept > 0.0
     assert first * fresh < 0.0

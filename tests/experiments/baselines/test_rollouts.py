@@ -58,7 +58,7 @@ def test_a_boat_already_inside_goes_on_with_what_it_committed_to(name):
         sent = guard.decide(state, ahead(state, 1.0), ours)
         assert guard.reason[0, 0] == 2
         np.testing.assert_array_equal(sent[0, 0], [2.0, 0.0])  # what was wanted when it was committed to
-        assert guard.certificate_m[0, 0] < 0.0
+        assert guard.safety_margin_m[0, 0] < 0.0
     sent = guard.decide(state, ahead(state, 1.0), ours)
     np.testing.assert_allclose(sent[0, 0], [speed, heading])
 
@@ -76,7 +76,7 @@ def test_inside_the_radius_pl_cbf_answers_with_numbers():
         guard = guard_for("pl-cbf", state)
         sent = guard.decide(state, ahead(state), np.array([[True, False]]))
         assert np.isfinite(sent).all()
-        assert guard.certificate_m[0, 0] < 0.0
+        assert guard.safety_margin_m[0, 0] < 0.0
 
 
 def test_the_worst_opponent_is_met_earlier_than_one_that_holds_course():

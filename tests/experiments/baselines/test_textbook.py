@@ -73,7 +73,7 @@ def test_the_certificate_is_the_distance_less_the_radius():
     state = scene((0, 0, 0), (0.5, 8, 180))
     guard = guard_for("parabolic", state)
     guard.decide(state, ahead(state), OURS[:1])
-    assert guard.certificate_m[0, 0] == pytest.approx(np.hypot(0.5, 8) - guard.radius_m)
+    assert guard.safety_margin_m[0, 0] == pytest.approx(np.hypot(0.5, 8) - guard.radius_m)
 
 
 def test_unknown_names_and_gains_of_another_filter_are_refused():

@@ -34,7 +34,7 @@ class Stream:
         state = core.state[0].copy()
         fleet = Fleet(state, core.team, self.config.platforms, core.team == 0, self.names)
         self.decisions = self.shield.decide(fleet, Commands.relative_deg(commands[0]), self.surroundings)
-        return self.decisions.sent.values[np.newaxis]
+        return self.decisions.filtered.values[np.newaxis]
 
     @property
     def surroundings(self):
@@ -60,14 +60,14 @@ class Stream:
                 )  # fmt: skip
                 decision = self.decisions[i]
                 sent[name] = Sent(
-                    name, now_s, decision.sent_heading_rad, decision.sent_speed_mps, "SET_ATTITUDE_TARGET", True
+                    name, now_s, decision.filtered_heading_rad, decision.filtered_speed_mps, "SET_ATTITUDE_TARGET", True
                 )
             else:
                 contacts.append(Contact(name, position, heading, float(state[i, L.SPEED]), now_s - 0.12, 0.3, "hub"))
         made = {
             "number": self.number, "due_s": now_s, "began_s": now_s + 0.0003, "sent_s": now_s + 0.004,
             "readings": readings, "contacts": tuple(contacts), "fleet": self.decisions.fleet,
-            "wanted": self.decisions.wanted, "surroundings": self.surroundings, "decisions": self.decisions,
+            "wanted": self.decisions.nominal, "surroundings": self.surroundings, "decisions": self.decisions,
             "shield_reset": False, "sent": sent, "policy_age_s": 0.06, "actions": tuple(actions),
             "game": state_of(self.env.core, self.names).as_dict(),
         }  # fmt: skip

@@ -29,7 +29,7 @@ def made_tick(fleet, now_s=5.0, names=None, **changes):
         sent=Commands.absolute_rad(_rad(sent)),
         intervened=np.array([False, True, True, False, False, False]),
         reason=np.array([Reason.PASSED, Reason.LEAST_CHANGE, Reason.BEST_EFFORT, *[Reason.NOT_COVERED] * 3]),
-        certificate_m=np.array([math.inf, 0.25, -1.5, *[math.nan] * 3]),
+        safety_margin_m=np.array([math.inf, 0.25, -1.5, *[math.nan] * 3]),
         slack_m=np.zeros(6),
         bound=np.array([-1, 5, -2, -1, -1, -1]),
         solve_time_s=0.001,
@@ -48,7 +48,7 @@ def made_tick(fleet, now_s=5.0, names=None, **changes):
             contacts.append(Contact(name, position, float(heading[i]), speed, now_s - 0.12, 0.3, "hub"))
     made = {
         "number": 1, "due_s": now_s, "began_s": now_s, "sent_s": now_s, "readings": readings,
-        "contacts": tuple(contacts), "fleet": state, "wanted": decisions.wanted, "surroundings": Surroundings(),
+        "contacts": tuple(contacts), "fleet": state, "wanted": decisions.nominal, "surroundings": Surroundings(),
         "decisions": decisions, "shield_reset": False, "sent": told, "policy_age_s": 0.06, "actions": (), "game": {},
     }  # fmt: skip
     return Tick(**{**made, **changes})

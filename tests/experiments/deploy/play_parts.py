@@ -233,6 +233,6 @@ def total(results: list[dict], words: str) -> str:
     after = sum(breach["after_run"] for result in results for breach in result["breaches"])
     return (
         f"{words}: {minutes:.1f} min, {len(during)} breaches during runs ({len(during) / minutes:.2f} a minute): "
-        f"{mates} of team-mates, {len(during) - mates} with opponents, {avoidable} of these avoidable; "
+        f"{mates} of teammates, {len(during) - mates} with opponents, {avoidable} of these avoidable; "
         f"{after} after runs"
     )

@@ -111,9 +111,9 @@ def test_a_row_says_wanted_sent_why_and_the_closest_approach(stream):
     tick = stream.tick(5.0)
     decision = tick.decisions[0]
     line = row_of(shown(stream.fleet, Moment(tick, 5.05)), "blue_1")
-    heading = round(math.degrees(decision.wanted_heading_rad)) % 360
-    assert f"{decision.wanted_speed_mps:.1f} {heading:03d}°" in line
-    assert f"{decision.sent_speed_mps:.1f} " in line
+    heading = round(math.degrees(decision.nominal_heading_rad)) % 360
+    assert f"{decision.nominal_speed_mps:.1f} {heading:03d}°" in line
+    assert f"{decision.filtered_speed_mps:.1f} " in line
     near = approaches(tick.fleet)["blue_1"]
     assert f"{near.other} {near.closest_m:.1f} m" in line
     other = row_of(shown(stream.fleet, Moment(tick, 9.0)), "red_1")

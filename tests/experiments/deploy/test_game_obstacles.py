@@ -74,8 +74,8 @@ def test_the_same_game_is_decided_the_same_bit_for_bit_with_the_own_flag_home_ta
         beside, around = played.beside
         decided = env.decisions
         assert len(around.stops) == 1
-        np.testing.assert_array_equal(beside.sent.values, decided.sent.values)
-        np.testing.assert_array_equal(beside.certificate_m, decided.certificate_m)
+        np.testing.assert_array_equal(beside.filtered.values, decided.filtered.values)
+        np.testing.assert_array_equal(beside.safety_margin_m, decided.safety_margin_m)
         np.testing.assert_array_equal(beside.reason, decided.reason)
         homes.append(home)
         changed += decided.count_intervened > 0

@@ -33,7 +33,7 @@ def show(capsys, *results):
 
 @pytest.mark.parametrize("part", PARTS, ids=lambda part: part.name)
 def test_three_against_three(part, tmp_path, capsys):
-    """No breach of team-mates, no avoidable one with opponents, every command within the freshness contract."""
+    """No breach of teammates, no avoidable one with opponents, every command within the freshness contract."""
     result = played(part, tmp_path)
     show(capsys, result)
     during = [breach for breach in result["breaches"] if not breach["after_run"]]

@@ -44,7 +44,7 @@ def run(*arguments):
 def lied(tick, from_number=30):
     if tick.number < from_number:
         return tick
-    decisions = dataclasses.replace(tick.decisions, certificate_m=tick.decisions.certificate_m + 1.0)
+    decisions = dataclasses.replace(tick.decisions, safety_margin_m=tick.decisions.safety_margin_m + 1.0)
     return dataclasses.replace(tick, decisions=decisions)
 
 
@@ -135,7 +135,7 @@ ALTERED = {
     ),
     "a certificate altered": (
         lambda records: changed_tick(
-            records, lambda tick: {"boats": [{**tick["boats"][0], "certificate_m": 9.0}, *tick["boats"][1:]]}
+            records, lambda tick: {"boats": [{**tick["boats"][0], "safety_margin_m": 9.0}, *tick["boats"][1:]]}
         ),
         1,
         ("1 differ", "some are not as they were written"),

@@ -35,7 +35,7 @@ def folder(tmp_path_factory):
 def _lie(tick):
     if tick.number != 30:
         return tick
-    decisions = dataclasses.replace(tick.decisions, certificate_m=tick.decisions.certificate_m + 1e-12)
+    decisions = dataclasses.replace(tick.decisions, safety_margin_m=tick.decisions.safety_margin_m + 1e-12)
     return dataclasses.replace(tick, decisions=decisions)
 
 
@@ -57,7 +57,7 @@ def test_a_log_that_lies_is_found_out(folder):
     assert result.exit_code == 1
     assert "159 of 160 decisions are the same, 1 differ" in result.output
     text = " ".join(result.output.split())
-    assert "First difference: tick 30 at 3.00 s, blue_1, certificate_m" in text
+    assert "First difference: tick 30 at 3.00 s, blue_1, safety_margin_m" in text
 
 
 def test_a_cut_log_is_proved_as_far_as_it_goes(folder):
@@ -94,7 +94,7 @@ def test_without_the_shield_with_everything_written(folder, tmp_path):
     assert "as it was" in page
     assert "without the shield" in page
     assert load(files["npz"])["position"].shape == (STEPS, 4, 2)
-    assert "closest team-mate" in result.output
+    assert "closest teammate" in result.output
 
 
 def test_breaches_that_happened_get_verdicts(folder, tmp_path):

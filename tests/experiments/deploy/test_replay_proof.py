@@ -83,8 +83,8 @@ def test_a_log_proves_itself(log):
     [
         {},
         {"coordination": "per_boat", "delay_s": 0.3},
-        {"certificate": "value_table", "position_error_m": 0.3, "response_per_s": math.inf},
-        {"separation_m": 4.0, "edge_m": None, "solver": "quadprog", "certificate": "turning_circle"},
+        {"opponent_model": "value_table", "position_error_m": 0.3, "cbf_rate_per_s": math.inf},
+        {"separation_m": 4.0, "edge_m": None, "solver": "quadprog", "opponent_model": "turning_circle"},
     ],
     ids=lambda settings: ",".join(settings) or "defaults",
 )
@@ -95,7 +95,7 @@ def test_any_settings_and_inputs_come_back(tmp_path, settings, kind):
     assert proof.same == proof.decisions == 120
 
 
-@pytest.mark.parametrize("name", ["certificate_m", "slack_m", "reason", "bound", "intervened"])
+@pytest.mark.parametrize("name", ["safety_margin_m", "slack_m", "reason", "bound", "intervened"])
 def test_a_value_that_differs_in_its_last_bit_is_found_and_named(log, name):
     header, ticks = log
     values = getattr(ticks[50].decisions, name).copy()
@@ -110,7 +110,7 @@ def test_a_value_that_differs_in_its_last_bit_is_found_and_named(log, name):
 
 def test_a_command_that_differs_in_its_last_bit_is_found(log):
     header, ticks = log
-    values = ticks[60].decisions.sent.values.copy()
+    values = ticks[60].decisions.filtered.values.copy()
     values[0, 1] = np.nextafter(values[0, 1], -9.0)
     proof = prove(header, edited(ticks, 60, sent=Commands(values, False)))
     assert proof.first.what == "sent heading"
@@ -168,11 +168,11 @@ def test_after_missing_ticks_nothing_is_proved_until_the_next_reset(tmp_path):
     assert proof.missing == [(49, 60)]
     assert proof.holds
     assert proof.same + proof.unproven == STEPS - 10
-    values = ticks[70].decisions.certificate_m + 1.0
-    lied = prove(header, [t for t in edited(ticks, 70, certificate_m=values) if not 50 <= t.number < 60])
+    values = ticks[70].decisions.safety_margin_m + 1.0
+    lied = prove(header, [t for t in edited(ticks, 70, safety_margin_m=values) if not 50 <= t.number < 60])
     assert lied.holds  # not provable: before the reset at 80
     assert lied.unproven == proof.unproven + 1
-    late = prove(header, [t for t in edited(ticks, 90, certificate_m=values) if not 50 <= t.number < 60])
+    late = prove(header, [t for t in edited(ticks, 90, safety_margin_m=values) if not 50 <= t.number < 60])
     assert late.different == 1
     assert late.first.tick == 90
 
@@ -180,18 +180,18 @@ def test_after_missing_ticks_nothing_is_proved_until_the_next_reset(tmp_path):
 def test_a_log_that_begins_in_the_middle_proves_nothing_until_a_reset(tmp_path):
     write_log(tmp_path / "run.mcap", STEPS, kind=OddEncounter)
     header, ticks = read(tmp_path / "run.mcap")
-    lied = edited(ticks, 30, certificate_m=ticks[30].decisions.certificate_m + 1.0)
+    lied = edited(ticks, 30, safety_margin_m=ticks[30].decisions.safety_margin_m + 1.0)
     assert prove(header, lied).different == 1
     assert prove(header, lied[25:]).different == 0
 
 
 def test_a_change_of_the_fleet_makes_the_shield_forget_as_well(log):
     header, ticks = log
-    known = prove(header, edited(ticks, 90, certificate_m=ticks[90].decisions.certificate_m + 1.0)[70:])
+    known = prove(header, edited(ticks, 90, safety_margin_m=ticks[90].decisions.safety_margin_m + 1.0)[70:])
     assert known.different == 0
     three = [_without_last(tick) if tick.number < 80 else tick for tick in ticks[70:]]
     decided = _decided_again(header, three)
-    lied = edited(decided, 20, certificate_m=decided[20].decisions.certificate_m + 1.0)
+    lied = edited(decided, 20, safety_margin_m=decided[20].decisions.safety_margin_m + 1.0)
     assert prove(header, decided).same == len(decided)
     assert prove(header, lied).different == 1
 

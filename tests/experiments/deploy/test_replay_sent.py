@@ -23,15 +23,15 @@ def ticks():
 
 def decided(tick, name="blue_1"):
     i = tick.fleet.names.index(name)
-    return tick.decisions.sent.absolute(i, float(tick.fleet.heading_rad[i]))
+    return tick.decisions.filtered.absolute(i, float(tick.fleet.heading_rad[i]))
 
 
 def with_decided(tick, speed_mps, heading_rad=1.0):
     """The tick with another decision for blue_1, and the same for blue_2."""
-    values = tick.decisions.sent.values.copy()
+    values = tick.decisions.filtered.values.copy()
     values[0] = speed_mps, heading_rad
-    sent = dataclasses.replace(tick.decisions.sent, values=values)
-    return dataclasses.replace(tick, decisions=dataclasses.replace(tick.decisions, sent=sent))
+    sent = dataclasses.replace(tick.decisions.filtered, values=values)
+    return dataclasses.replace(tick, decisions=dataclasses.replace(tick.decisions, filtered=sent))
 
 
 def with_sent(tick, name="blue_1", **parts):

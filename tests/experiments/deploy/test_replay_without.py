@@ -49,8 +49,8 @@ def test_tracks_are_what_was_seen(run):
         assert np.nan_to_num(gap) == pytest.approx(0.0, abs=1e-6)
     for k in (0, 77, STEPS - 2):
         decisions = ticks[k].decisions
-        assert tracks.sent[k, 0] == pytest.approx(decisions.sent.absolute(0, decisions.fleet.heading_rad[0]))
-        assert tracks.wanted[k, 1] == pytest.approx(decisions.wanted.absolute(1, decisions.fleet.heading_rad[1]))
+        assert tracks.sent[k, 0] == pytest.approx(decisions.filtered.absolute(0, decisions.fleet.heading_rad[0]))
+        assert tracks.wanted[k, 1] == pytest.approx(decisions.nominal.absolute(1, decisions.fleet.heading_rad[1]))
         assert np.array_equal(tracks.reason[k], decisions.reason)
         assert np.isnan(tracks.wanted[k, 2:]).all()  # nobody knows what opponents wanted
 

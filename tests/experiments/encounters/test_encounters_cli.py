@@ -170,7 +170,7 @@ def test_the_worst_are_the_avoidable_then_the_closest_of_the_shield():
 )
 def test_goals_of_the_shield(avoidable, unavoidable, not_judged, expected):
     counts = {"avoidable": avoidable, "unavoidable": unavoidable, "not_judged": not_judged, "encounters": 100}
-    cell = asdict(Cell("shield:tail_s=4", "heron", "heron", "rammer_2")) | counts
+    cell = asdict(Cell("shield:straight_horizon_s=4", "heron", "heron", "rammer_2")) | counts
     assert [goal["met"] for goal in goals_of([cell])] == expected
     assert goals_of([cell | {"guard": "parabolic"}]) == []
 

@@ -1,4 +1,4 @@
-"""Closed loops that were lost once: crowds, two rammers on the quarters, a livelock of team-mates."""
+"""Closed loops that were lost once: crowds, two rammers on the quarters, a livelock of teammates."""
 
 import dataclasses
 
@@ -54,7 +54,7 @@ def test_two_that_close_in_from_both_quarters_are_seen_coming():
 
 
 def test_who_takes_them_to_hold_their_course_loses_them():
-    assert (closest_m("shield:profile=hold-course") < 2.5).mean() >= 0.3
+    assert (closest_m("shield:profile=constant_velocity") < 2.5).mean() >= 0.3
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +86,7 @@ def circling(guard):
 
 
 def test_a_livelock_among_team_mates_is_seen_though_nobody_stands_still():
-    livelock = circling("shield:give_way_after_s=inf")
+    livelock = circling("shield:deadlock_timeout_s=inf")
     lost = livelock.columns["never_arrived"]
     assert (lost > 0.0).any()
     assert (lost < 0.7).all(), "two sail on side by side, the third gets across"

@@ -24,7 +24,7 @@ class Recording:
     """Turns every own boat by a set angle, and keeps what it was shown."""
 
     def __init__(self, games, boats, turn_deg=0.0, speed=None):
-        self.reason, self.certificate_m = np.zeros((games, boats), np.int64), np.zeros((games, boats))
+        self.reason, self.safety_margin_m = np.zeros((games, boats), np.int64), np.zeros((games, boats))
         self.turn_deg, self.speed, self.seen = turn_deg, speed, []
 
     def decide(self, state, wanted, ours):
@@ -81,7 +81,7 @@ class _Turner:
     """Commands one absolute heading, as a relative one."""
 
     heading = 50.0
-    reason, certificate_m = np.zeros((1, 2), np.int64), np.zeros((1, 2))
+    reason, safety_margin_m = np.zeros((1, 2), np.int64), np.zeros((1, 2))
 
     def decide(self, state, wanted, ours):
         sent = wanted.copy()
@@ -147,14 +147,14 @@ def test_phases_begin_by_time_or_by_distance_and_are_never_left():
 
 
 def test_guards_by_name():
-    assert parse_guards("none,shield:adversary_s=5,tail_s=4,parabolic") == [
+    assert parse_guards("none,shield:adversary_horizon_s=5,straight_horizon_s=4,parabolic") == [
         "none",
-        "shield:adversary_s=5,tail_s=4",
+        "shield:adversary_horizon_s=5,straight_horizon_s=4",
         "parabolic",
     ]
-    assert split_name("shield:response_per_s=inf,certificate=distance") == (
+    assert split_name("shield:cbf_rate_per_s=inf,opponent_model=distance") == (
         "shield",
-        {"response_per_s": math.inf, "certificate": "distance"},
+        {"cbf_rate_per_s": math.inf, "opponent_model": "distance"},
     )
     scenes = draw("head_on", "heron", "heron", USUAL, 0, 0, 2)
     assert isinstance(build_guard("none", scenes, USUAL), NoGuard)

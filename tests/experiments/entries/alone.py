@@ -90,7 +90,7 @@ def decide(shield, fleet, commands, surroundings, recorded):
         rows, recorded["controlled"], recorded["driven"], recorded["wanted"], strict=True
     ):
         seen = fleet(row, team, ("surveyor",) * 6, ours, names, driven=driven)
-        sent.append(shield.decide(seen, commands.game_deg(wanted), around).sent.values)
+        sent.append(shield.decide(seen, commands.game_deg(wanted), around).filtered.values)
     return sent
 
 

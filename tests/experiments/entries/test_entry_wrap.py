@@ -61,7 +61,7 @@ def folder_of_entry(tmp_path_factory):
 def wrapped(folder_of_entry, tmp_path_factory):
     """A shielded zip, what was told of it, and a folder it is unpacked in."""
     place = tmp_path_factory.mktemp("wrapped")
-    done = run("wrap", folder_of_entry, "--out", place / "s.zip", "--profile", "rammers", "--json", place / "s.json")
+    done = run("wrap", folder_of_entry, "--out", place / "s.zip", "--profile", "ramming", "--json", place / "s.json")
     assert done.exit_code == ExitCode.OK, done.output
     with zipfile.ZipFile(place / "s.zip") as packed:
         packed.extractall(place / "unpacked")
@@ -132,7 +132,7 @@ def test_it_is_small_and_says_what_is_in_it(wrapped):
     path, told, folder = wrapped
     assert path.stat().st_size == told["bytes"] <= 5e6
     assert undocumented(told, KEYS["entry wrap"]) == []
-    assert (told["shield"]["separation_m"], told["shield"]["profile"]) == (4.0, "rammers")
+    assert (told["shield"]["separation_m"], told["shield"]["profile"]) == (4.0, "ramming")
     assert (told["shield"]["dt_s"], told["shield"]["move_s"]) == (1.0, pytest.approx(0.1))
     assert (folder / "helper.py").read_text() == "TOP = 3.0\n"
 
@@ -143,12 +143,12 @@ def test_it_says_which_game_and_which_shield_it_is_for(wrapped, tmp_path):
     assert (made.preset, made.separation_m, made.decision_s) == ("mctf2026", 4.0, 1.0)
     assert made.shield == told["shield"]
     read_me = ast.get_docstring(ast.parse((folder / "solution.py").read_text()))
-    assert "For preset mctf2026, a decision every 1 s. The shield keeps 4 m, profile rammers" in " ".join(
+    assert "For preset mctf2026, a decision every 1 s. The shield keeps 4 m, profile ramming" in " ".join(
         read_me.split()
     )
     file = tmp_path / "c.json"
     done = run("check", path, "--max-time", 2, "--json", file)
-    assert "made by steerclear for preset mctf2026; its shield keeps 4 m, rammers" in done.stdout
+    assert "made by steerclear for preset mctf2026; its shield keeps 4 m, ramming" in done.stdout
     assert json.loads(file.read_text())["made_for"]["shield"] == told["shield"]
     assert undocumented(json.loads(file.read_text()), KEYS["entry check"]) == []
 

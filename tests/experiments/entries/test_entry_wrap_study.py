@@ -34,7 +34,7 @@ class Noting(Shield):
         state[:, UNTOLD] = np.nan
         fleet = replace(fleet, state=state)
         decisions = super().decide(fleet, wanted, surroundings)
-        self.noted.append((fleet, wanted.values.copy(), surroundings, decisions.sent.values.copy()))
+        self.noted.append((fleet, wanted.values.copy(), surroundings, decisions.filtered.values.copy()))
         return decisions
 
 
@@ -72,7 +72,7 @@ def test_ten_thousand_decisions_are_the_same(tmp_path, monkeypatch, capsys):
             edge = plain["surroundings"].Surroundings(around.field)
             begun = time.process_time()
             with np.errstate(all="ignore"):
-                found = shield.decide(seen, plain["commands"].Commands.game_deg(wanted), edge).sent.values
+                found = shield.decide(seen, plain["commands"].Commands.game_deg(wanted), edge).filtered.values
             spent.append(time.process_time() - begun)
             worst, changed = max(worst, np.abs(found - sent).max()), changed + bool((sent != wanted).any())
     with capsys.disabled():

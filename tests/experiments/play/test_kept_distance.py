@@ -14,7 +14,7 @@ from typer.testing import CliRunner
     [
         ("aamas2024", {}, {}, None),
         ("mctf2025", {}, {}, 4.0),
-        ("mctf2026", {}, {"profile": "rammers"}, 4.0),
+        ("mctf2026", {}, {"profile": "ramming"}, 4.0),
         ("mctf2025", {}, {"separation_m": 2.5}, 2.5),
         ("aamas2024", {"agent_radius_m": 3.0}, {}, 6.0),
         ("mctf2025", {"agent_radius_m": 0.5}, {}, None),

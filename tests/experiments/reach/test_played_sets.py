@@ -79,7 +79,7 @@ def no_duels(monkeypatch):
 
 def test_a_shield_that_fears_nobody_loses_more(heron):
     state = meeting((1.0, 6.0), (2.0, 5.0))
-    assert games_lost(heron, ShieldConfig(profile="hold-course"), state, RADIUS_M, 8.0).all()
+    assert games_lost(heron, ShieldConfig(profile="constant_velocity"), state, RADIUS_M, 8.0).all()
     assert not games_lost(heron, ShieldConfig(), state, RADIUS_M, 8.0).any()
 
 
@@ -144,7 +144,7 @@ def test_the_command_goes_on_where_it_was_cut_off_and_makes_a_page(tmp_path, few
         (["--shield-set", "dt_s=0.5"], "dt_s cannot be set here"),
         (["--shield-set", "delay_s=0.5"], "delay_s cannot be set here"),
         (["--shield-set", "coordination=per_boat"], "coordination cannot be set here"),
-        (["--shield-set", "tail=1"], "did you mean 'tail_s'"),
+        (["--shield-set", "tail=1"], "did you mean 'straight_horizon_s'"),
         (["--radius", "9"], "choose one within"),
         (["--jobs", "0"], "at least 1"),
     ],

@@ -59,7 +59,7 @@ def test_the_manoeuvre_certificate_gives_up_where_reachability_does(heron, headi
 
 
 def test_opponents_that_only_hold_their_course_leave_a_smaller_set_that_misses_what_the_table_calls_lost(heron):
-    tame = ShieldConfig(separation_m=RADIUS_M, buffer_m=0.0, adversary_s=0.0)
+    tame = ShieldConfig(separation_m=RADIUS_M, buffer_m=0.0, adversary_horizon_s=0.0)
     pair = compare_pair(heron, tame, 90.0, 2.0, 2.0)
     assert math.pi * RADIUS_M**2 <= pair.shield_m2 < pair.reach_m2
     assert pair.missed_m2 >= pair.reach_m2 - pair.shield_m2 - 1e-9
@@ -83,7 +83,7 @@ def test_areas_of_the_same_size_in_other_places_are_seen(heron, monkeypatch):
 
 def test_a_shield_that_looks_up_the_table_is_not_judged_by_what_it_misses(tmp_path, head_on):
     file = tmp_path / "sets.json"
-    settings = ["--shield-set", "certificate=value_table", "--shield-set", "table_margin_m=0"]
+    settings = ["--shield-set", "opponent_model=value_table", "--shield-set", "table_margin_m=0"]
     assert compare("--json", str(file), *settings).exit_code == 0
     content = json.loads(file.read_text())
     assert content["looked_up"]
@@ -91,7 +91,7 @@ def test_a_shield_that_looks_up_the_table_is_not_judged_by_what_it_misses(tmp_pa
     write_pages([content], tmp_path)
     assert "looks opponents up in this very table" in (tmp_path / "unsafe_sets.md").read_text()
     file.unlink()
-    run_through = compare("--json", str(file), "--shield-set", "certificate=turning_circle")
+    run_through = compare("--json", str(file), "--shield-set", "opponent_model=turning_circle")
     assert run_through.exit_code == 0
     assert not json.loads(file.read_text())["looked_up"]
     write_pages([json.loads(file.read_text())], tmp_path)
@@ -116,9 +116,11 @@ def test_settings_that_would_compare_two_questions_are_refused(setting, tmp_path
 
 
 def test_other_settings_reach_the_shield():
-    assert sets_config(RADIUS_M, {"adversary_s": 5.0}) == ShieldConfig(profile="rammers", buffer_m=0.0, adversary_s=5.0)
-    assert sets_config(RADIUS_M, {}).feared_s == math.inf
-    with pytest.raises(ConfigError, match="did you mean 'tail_s'"):
+    assert sets_config(RADIUS_M, {"adversary_horizon_s": 5.0}) == ShieldConfig(
+        profile="ramming", buffer_m=0.0, adversary_horizon_s=5.0
+    )
+    assert sets_config(RADIUS_M, {}).adversary_horizon_s == math.inf
+    with pytest.raises(ConfigError, match="did you mean 'straight_horizon_s'"):
         sets_config(RADIUS_M, {"tail": 1.0})
 
 
@@ -147,11 +149,11 @@ def test_bars_judge_the_worst_pair():
 
 def test_the_command_writes_documented_json_that_becomes_a_page(tmp_path, head_on):
     file = tmp_path / "sets.json"
-    result = compare("--json", str(file), "--shield-set", "tail_s=5")
+    result = compare("--json", str(file), "--shield-set", "straight_horizon_s=5")
     assert result.exit_code == 0, result.output
     content = json.loads(file.read_text())
     assert undocumented(content, SETS) == []
-    assert content["settings"] == head(tail_s=5)["settings"]
+    assert content["settings"] == head(straight_horizon_s=5)["settings"]
     assert content["versions"]["steerclear"]
     assert content["machine"]["cores"] >= 1
     assert content["wall_s"] > 0
@@ -159,7 +161,7 @@ def test_the_command_writes_documented_json_that_becomes_a_page(tmp_path, head_o
     page = (tmp_path / "unsafe_sets.md").read_text()
     assert "cannot promise to save" in page.splitlines()[0]
     assert "heron meets heron, 2.5 m" in page
-    assert "tail_s=5" in page
+    assert "straight_horizon_s=5" in page
     assert f"| {content['pairs'][0]['shield_m2']:.1f} | {content['pairs'][0]['reach_m2']:.1f} |" in page
     for bar in content["goals"]:
         assert f"| {bar['name']} |" in page

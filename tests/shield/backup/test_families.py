@@ -15,8 +15,8 @@ def looked_at(kinds, team, **settings):
     ("kinds", "settings", "count"),
     [
         (("surveyor", "surveyor"), {}, [21, 21]),
-        (("surveyor", "surveyor"), {"certificate": "turning_circle"}, [27, 27]),
-        (("surveyor", "surveyor"), {"profile": "hold-course"}, [27, 27]),
+        (("surveyor", "surveyor"), {"opponent_model": "turning_circle"}, [27, 27]),
+        (("surveyor", "surveyor"), {"profile": "constant_velocity"}, [27, 27]),
         (("heron", "surveyor"), {}, [27, 21]),
         (("heron", "ardurover_boat"), {}, [27, 40]),
     ],

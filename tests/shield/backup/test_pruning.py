@@ -32,11 +32,11 @@ def test_no_boat_goes_faster_over_ground_than_the_proof_says(name):
 
 
 @pytest.mark.parametrize("certificate", ["turning_circle", "value_table"])
-@pytest.mark.parametrize("adversary_s", [0.0, 4.0, np.inf])
-def test_decisions_are_the_same_when_no_pair_is_left_out(certificate, adversary_s):
+@pytest.mark.parametrize("adversary_horizon_s", [0.0, 4.0, np.inf])
+def test_decisions_are_the_same_when_no_pair_is_left_out(certificate, adversary_horizon_s):
     """Clusters of boats, far from one another: some pairs matter, some do not."""
     random = np.random.default_rng(11)
-    config = ShieldConfig(certificate=certificate, adversary_s=adversary_s)
+    config = ShieldConfig(opponent_model=certificate, adversary_horizon_s=adversary_horizon_s)
     platforms, team = ["heron"] * 4 + ["surveyor"] * 3, [0, 0, 1, 1, 0, 1, 1]
     skipped = changed = 0
     for _ in range(60):
@@ -67,16 +67,16 @@ def test_a_boat_far_away_never_changes_a_decision(away_m, team):
         far = (away_m * np.sin(bearing), away_m * np.cos(bearing), random.uniform(-180.0, 180.0), 2.0)
         alone = Shield().decide(fleet_of(rows, [0, 1]), relative(*wanted[:2]))
         crowd = Shield().decide(fleet_of([*rows, far], [0, 1, team]), relative(*wanted))
-        assert bits(alone.sent.values) == bits(crowd.sent.values[:2])
+        assert bits(alone.filtered.values) == bits(crowd.filtered.values[:2])
         assert alone.reason.tolist() == crowd.reason[:2].tolist()
-        assert alone.certificate_m[0] == crowd.certificate_m[0]
+        assert alone.safety_margin_m[0] == crowd.safety_margin_m[0]
 
 
 def test_a_boat_just_within_reach_is_looked_at():
     """So that the test above does not pass because nobody ever is."""
     rows = [(0.0, 0.0, 0.0, 2.0), (0.0, 8.0, 180.0, 2.0)]
     near = Shield().decide(fleet_of(rows, [0, 1]), relative((2.0, 0.0), (2.0, 0.0)))
-    assert near[0].binding == ("boat_1",)
+    assert near[0].active_constraints == ("boat_1",)
     assert packed(["heron"]).shape == (1, L.N_PARAM)
 
 
@@ -86,5 +86,5 @@ def test_hundreds_of_boats_that_all_have_to_move_are_decided_for():
     rows = [(200.0 * (i % 25), 200.0 * (i // 25), 0.0, 5.0) for i in range(n)]
     shield = Shield(surroundings=Surroundings(keep_out=[(2500.0, 2500.0, 1e5)]))
     decisions = shield.decide(fleet_of(rows, [0] * n, "si"), relative(*[(10.0, 0.0)] * n))
-    assert np.isfinite(decisions.sent.values).all()
+    assert np.isfinite(decisions.filtered.values).all()
     assert (decisions.reason != Reason.PASSED).all()

@@ -29,7 +29,9 @@ def apart(x, y, heading_deg):
 def certificates_m(fleet, **settings):
     """Margins told of the first boat, by time."""
     wanted = relative((3.0, 0.0), (3.0, 0.0))
-    return [Shield(adversary_s=time_s, **settings).decide(fleet, wanted)[0].certificate_m for time_s in TIMES_S]
+    return [
+        Shield(adversary_horizon_s=time_s, **settings).decide(fleet, wanted)[0].safety_margin_m for time_s in TIMES_S
+    ]
 
 
 @pytest.mark.parametrize("gap_m", [14.0, 20.0, 26.0])
@@ -45,7 +47,7 @@ def test_a_pursuer_holds_its_course_after_its_time():
     for state in scattered(random, 60, ["heron", "heron"], 25.0, gap_m=4.0):
         margins = []
         for time_s in TIMES_S[1:]:
-            config = ShieldConfig(adversary_s=time_s, certificate="turning_circle", margin_cap_m=50.0)
+            config = ShieldConfig(adversary_horizon_s=time_s, opponent_model="turning_circle", margin_cap_m=50.0)
             at = stages_of(config, state, ["heron"] * 2, [0, 1])
             find_neighbours(at.scene)
             at.fear_s[:] = time_s
@@ -66,7 +68,7 @@ def test_less_fear_changes_no_more_commands():
     ours = np.broadcast_to(np.array([True, False, False]), (count, 3)).copy()
     changed = []
     for time_s in TIMES_S:
-        guard = BatchedShield(ShieldConfig(adversary_s=time_s), count, platforms, team)
+        guard = BatchedShield(ShieldConfig(adversary_horizon_s=time_s), count, platforms, team)
         sent = guard.decide(states.copy(), wanted.copy(), ours)
         changed.append(int((sent[:, 0] != wanted[:, 0]).any(axis=1).sum()))
     assert all(sooner <= later + 3 for sooner, later in itertools.pairwise(changed)), changed

@@ -38,7 +38,7 @@ def test_who_is_no_faster_is_followed_for_longer():
 
 
 def test_nobody_is_followed_for_longer_who_only_holds_its_course():
-    assert chase_s(boats("heron", "heron", adversary_s=0.0)) < 8.0
+    assert chase_s(boats("heron", "heron", adversary_horizon_s=0.0)) < 8.0
 
 
 def any_boat(random, params):
@@ -113,7 +113,7 @@ def table_m(bearing_deg, far_m, **settings):
     own[L.THRUST] = other[L.THRUST] = 100.0
     rows = np.array([own, other])
     at = stages_of(
-        ShieldConfig(**{"profile": "rammers", "buffer_m": 0.0, "margin_cap_m": 50.0, **settings}),
+        ShieldConfig(**{"profile": "ramming", "buffer_m": 0.0, "margin_cap_m": 50.0, **settings}),
         rows,
         ["heron"] * 2,
         [0, 1],
@@ -136,12 +136,12 @@ def test_who_closes_in_from_the_quarter_is_seen_coming_for_half_a_minute(bearing
         assert reached < 2.6
     assert (
         margin
-        <= table_m(bearing_deg, far_m, adversary_s=9.0) + 0.05
-        <= table_m(bearing_deg, far_m, adversary_s=1.0) + 0.1
+        <= table_m(bearing_deg, far_m, adversary_horizon_s=9.0) + 0.05
+        <= table_m(bearing_deg, far_m, adversary_horizon_s=1.0) + 0.1
     )
 
 
 def test_that_decides_of_an_all_but_parallel_course():
-    assert table_m(97.0, 7.0, adversary_s=0.0) > 0.5  # it holds its course
+    assert table_m(97.0, 7.0, adversary_horizon_s=0.0) > 0.5  # it holds its course
     assert table_m(97.0, 7.0) < 0.0
     assert sailed_m(97.0, 7.0, 0.3 * CHASE_S, CHASE_S) < 2.5

@@ -26,7 +26,7 @@ def scene(own, other, random):
         top = get_platform(name).max_speed_mps
         state[row] = fresh_state(x, y, random.uniform(-180.0, 180.0), random.uniform(0.0, 1.0) * top)
         state[row, [L.THRUST, L.SPEED_ERROR, L.HEADING_ERROR]] = random.uniform(0.0, 100.0), 0.0, 0.0
-    at = stages_of(ShieldConfig(profile="rammers", certificate="turning_circle"), state, (own, other), (0, 1))
+    at = stages_of(ShieldConfig(profile="ramming", opponent_model="turning_circle"), state, (own, other), (0, 1))
     find_neighbours(at.scene)
     side, turn = random.choice([-1.0, 1.0]), random.choice([0.0, 45.0, 120.0, 180.0])
     lay_path(0, 0, side, turn, get_platform(own).max_speed_mps, 0, at.scene)

@@ -30,7 +30,7 @@ def boat(x, y, heading_deg, speed_mps=3.0):
 def looked_around(*rows):
     """The first boat is ours, all are surveyors."""
     teams = [0] + [1] * (len(rows) - 1)
-    at = stages_of(ShieldConfig(profile="rammers"), np.array(rows), ["surveyor"] * len(rows), teams)
+    at = stages_of(ShieldConfig(profile="ramming"), np.array(rows), ["surveyor"] * len(rows), teams)
     find_neighbours(at.scene)
     return at
 
@@ -148,7 +148,7 @@ def test_a_look_up_is_kept_for_its_place_only():
 def test_the_margin_of_runs_is_remembered_once_for_all_opponents():
     """And asked for at the rate of margins of manoeuvres; of each opponent the look-up at once is remembered."""
     rows = boat(0.0, 0.0, 0.0), boat(0.0, 35.0, 180.0), boat(30.0, 0.0, -90.0)
-    at = stages_of(ShieldConfig(profile="rammers"), np.array(rows), ["surveyor"] * 3, [0, 1, 1])
+    at = stages_of(ShieldConfig(profile="ramming"), np.array(rows), ["surveyor"] * 3, [0, 1, 1])
     screened(at, np.array([[3.0, -90.0]] * 3))
     decided(at)
     assert at.memory[0, JOINT_MARGIN] == at.joint_m[0] == pytest.approx(1.0, abs=1.0)
@@ -156,7 +156,7 @@ def test_the_margin_of_runs_is_remembered_once_for_all_opponents():
     screened(at, np.array([[3.0, -90.0]] * 3))
     least_m = math.exp(-0.1) * min(at.memory[0, JOINT_MARGIN], at.boats.cap_m[0])
     assert at.joint_target_m[0] == pytest.approx(least_m)
-    alone = stages_of(ShieldConfig(profile="rammers"), np.array(rows[:2]), ["surveyor"] * 2, [0, 1])
+    alone = stages_of(ShieldConfig(profile="ramming"), np.array(rows[:2]), ["surveyor"] * 2, [0, 1])
     alone.memory[0, JOINT_MARGIN] = 1.0
     screened(alone, np.array([[3.0, -90.0]] * 2))
     decided(alone)

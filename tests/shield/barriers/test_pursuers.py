@@ -52,7 +52,7 @@ def chase(platform, own, pursuer, side, turn_deg, most, steps):
 def modelled(name, own, pursuer, side, turn_deg):
     """Least margin, m, the certificate expects of the same backup, and the steps over which it looks."""
     at = stages_of(
-        ShieldConfig(profile="rammers", buffer_m=0.0, certificate="turning_circle", margin_cap_m=50.0),
+        ShieldConfig(profile="ramming", buffer_m=0.0, opponent_model="turning_circle", margin_cap_m=50.0),
         np.array([own, pursuer]),
         (name, name),
         (0, 1),
@@ -94,7 +94,7 @@ def test_no_pursuer_that_steers_at_the_boat_comes_nearer_than_expected(name, mos
 
 def test_a_boat_that_regains_its_speed_at_once_is_followed_without_its_loss():
     at = {
-        name: stages_of(ShieldConfig(profile="rammers"), np.zeros((2, L.N_STATE)), (name, name), (0, 1))
+        name: stages_of(ShieldConfig(profile="ramming"), np.zeros((2, L.N_STATE)), (name, name), (0, 1))
         for name in ("heron", "surveyor")
     }
     assert at["heron"].boats.granted_loss[1] < 0.1

@@ -97,7 +97,7 @@ def test_a_single_decision_and_a_batch_say_the_same():
     batch = BatchedShield(config, 1, ("heron",), (0,))
     sent = batch.decide(fleet.state[None], np.array([[[1.5, 0.0]]]), np.array([[True]]))
     assert decisions.count_intervened == 1
-    assert np.allclose(sent[0], decisions.sent.values, atol=1e-6)
+    assert np.allclose(sent[0], decisions.filtered.values, atol=1e-6)
     assert batch.reason[0, 0] == decisions.reason[0]
 
 
@@ -107,7 +107,7 @@ def test_what_binds_is_named():
     register_barrier(Barrier("ferry", ferrys, values=NEAR))
     decision = Shield(barriers=("far", "ferry")).decide(lone(), Commands.relative_deg([[1.5, 0.0]]))[0]
     assert decision.intervened
-    assert decision.binding == ("ferry",)
+    assert decision.active_constraints == ("ferry",)
 
 
 def test_a_barrier_counts_as_an_obstacle_of_the_same_place_does():
@@ -135,7 +135,7 @@ def test_where_nothing_is_kept_a_margin_may_be_infinite(settings):
 
 
 def test_its_own_slope_is_taken(caplog):
-    """By the program, which is asked where team-mates are in the way; one that is none costs no distance."""
+    """By the program, which is asked where teammates are in the way; one that is none costs no distance."""
     register_barrier(
         Barrier("shore", lambda x, y, ahead, values: 12.0 - y, lambda x, y, ahead, values: (0.0, math.nan))
     )
@@ -177,8 +177,8 @@ def test_where_a_barrier_gives_no_margin_the_boat_stops_and_the_log_says_so(marg
     register_barrier(Barrier("chart", margin))
     with caplog.at_level(logging.WARNING):
         decision = Shield(barriers=("chart",)).decide(lone(y_m=4.0), Commands.relative_deg([[1.5, 0.0]]))[0]
-    assert (decision.reason, decision.sent_speed_mps) == (Reason.HELD, 0.0)
-    assert decision.binding == ("chart",)
+    assert (decision.reason, decision.filtered_speed_mps) == (Reason.HELD, 0.0)
+    assert decision.active_constraints == ("chart",)
     assert "'chart' gave no usable margin" in caplog.text
 
 
@@ -196,8 +196,8 @@ def test_without_its_values_the_boat_stops(broken, caplog):
     assert shield.decide(lone(), wanted)[0].reason is Reason.PASSED
     with caplog.at_level(logging.WARNING):
         decision = shield.decide(lone(), wanted)[0]
-    assert decision.binding == ("ais",)
-    assert (decision.reason, decision.sent_speed_mps) == (Reason.HELD, 0.0)
+    assert decision.active_constraints == ("ais",)
+    assert (decision.reason, decision.filtered_speed_mps) == (Reason.HELD, 0.0)
     assert "no values now" in caplog.text
 
 
@@ -291,7 +291,7 @@ from steerclear.shield.barriers import Barrier, register_barrier
 h = lambda x, y, ahead, values: (x * x + (y - values[0]) ** 2) ** 0.5 - 10.0
 register_barrier(Barrier("pole", h, values=(11.0,)))
 fleet = Fleet.of(position_m=[(0.0, 0.0)], heading_deg=[0.0], speed_mps=[1.5], team=[0], platforms="heron")
-print(Shield(barriers=("pole",)).decide(fleet, Commands.relative_deg([[1.5, 0.0]]))[0].sent_heading_rad)
+print(Shield(barriers=("pole",)).decide(fleet, Commands.relative_deg([[1.5, 0.0]]))[0].filtered_heading_rad)
 """
 
 

@@ -32,7 +32,7 @@ def meeting(random, name, gap_m):
 
 
 class Linearised:
-    """One program about the wanted commands, with its first row and the margin that row stands for."""
+    """One program about the nominal commands, with its first row and the margin that row stands for."""
 
     def __init__(self, at, count, rows_built):
         self.at, self.count = at, count
@@ -80,8 +80,8 @@ class Linearised:
 
 
 def linearised(random, name, team, gap_m, tries, surroundings=None):
-    """Programs of that many scenes in which the wanted commands are not safe."""
-    config = ShieldConfig(adversary_s=0.0)
+    """Programs of that many scenes in which the nominal commands are not safe."""
+    config = ShieldConfig(adversary_horizon_s=0.0)
     for _ in range(tries):
         at = stages_of(config, meeting(random, name, gap_m * random.uniform(0.6, 1.2)), [name] * 2, team, surroundings)
         top = get_platform(name).max_speed_mps

@@ -12,7 +12,7 @@ def decided(boats):
     fleet = fleet_of([(x, y, heading, 3.0) for x, y, heading in boats], [0] + [1] * (len(boats) - 1), "surveyor")
     fleet.state[:, L.THRUST] = 100.0
     answer = Shield().decide(fleet, relative(*[(3.0, 0.0)] * len(boats)))
-    return Reason(answer.reason[0]), answer.certificate_m[0]
+    return Reason(answer.reason[0]), answer.safety_margin_m[0]
 
 
 def scenes(count, reach_m):
@@ -50,12 +50,12 @@ def test_what_each_leaves_open_both_together_do_not(aside_m, ahead_m):
     bearing = np.degrees(np.arctan2(-aside_m, -ahead_m))
     starboard, port = (aside_m, ahead_m, bearing), (-aside_m, ahead_m, -bearing)
     for one in (starboard, port):
-        reason, certificate_m = decided([(0, 0, 0), one])
+        reason, safety_margin_m = decided([(0, 0, 0), one])
         assert reason == Reason.PASSED
-        assert certificate_m > 0.1
-    reason, certificate_m = decided([(0, 0, 0), starboard, port])
+        assert safety_margin_m > 0.1
+    reason, safety_margin_m = decided([(0, 0, 0), starboard, port])
     assert reason != Reason.PASSED
-    assert certificate_m < 0.0
+    assert safety_margin_m < 0.0
 
 
 @pytest.mark.parametrize("gap_m", [60.0, 200.0])

@@ -14,10 +14,12 @@ NONE = np.zeros((0, 3))
 NO_WALL = np.zeros((0, 4))
 
 
-def things(circles=NONE, walls=NO_WALL, hull_m=0.0, side_m=0.0, field=NO_EDGE, keep_out=NONE):
+def things(circles=NONE, walls=NO_WALL, obstacle_clearance_m=0.0, side_m=0.0, field=NO_EDGE, keep_out=NONE):
     """Static constraints, as compiled code takes them."""
     line = np.array([-np.inf, -np.inf, np.inf, np.inf])
-    return share(Static(field, keep_out, circles, walls, hull_m, side_m, 0.0, line, 0, 0, 0.0, new_registered()))
+    return share(
+        Static(field, keep_out, circles, walls, obstacle_clearance_m, side_m, 0.0, line, 0, 0, 0.0, new_registered())
+    )
 
 
 def clear_of(near_only, path, static, here=None, near=None, side=None, drift_m=0.0, grace=1.0):
@@ -66,13 +68,13 @@ def behind(path, here, wall):
     return np.cumsum(crossings) % 2 == 1
 
 
-def left_of(path, here, wall, hull_m, side_m, grace):
+def left_of(path, here, wall, obstacle_clearance_m, side_m, grace):
     """Distance kept from a wall, m: what the boat is short of now is excused, being behind it is not."""
     apart, now = distances_to(path, wall), distances_to(here[None], wall)[0]
-    before = apart - hull_m - min(0.0, now - hull_m) * grace ** np.arange(len(path))
+    before = apart - obstacle_clearance_m - min(0.0, now - obstacle_clearance_m) * grace ** np.arange(len(path))
     if now < side_m:
         return before
-    return np.where(behind(path, here, wall), -apart - hull_m, before)
+    return np.where(behind(path, here, wall), -apart - obstacle_clearance_m, before)
 
 
 def worth_of(margins, path, circle):
@@ -90,16 +92,16 @@ def worth_of(margins, path, circle):
     st.sampled_from([(0.0, 0.0), (0.2, 0.0), (0.7, 0.3), (1.7, 0.0)]),
 )
 def test_no_sample_that_counts_is_skipped(path, seed, current, kept):
-    (drift_m, grace), (hull_m, side_m) = current, kept
+    (drift_m, grace), (obstacle_clearance_m, side_m) = current, kept
     random = np.random.default_rng(seed)
     circles = np.column_stack([random.uniform(-20, 20, (3, 2)), random.uniform(0.0, 8.0, 3)])
     walls = random.uniform(-20, 20, (2, 4))
     last = len(path) - 1
-    out = clear_of_obstacles(path, things(circles, walls, hull_m, side_m), drift_m=drift_m, grace=grace)
+    out = clear_of_obstacles(path, things(circles, walls, obstacle_clearance_m, side_m), drift_m=drift_m, grace=grace)
     excuse = grace ** np.arange(last + 1)
     margins = [np.linalg.norm(path - circle[:2], axis=1) - circle[2] for circle in circles]
     left = [each - min(0.0, each[0]) * excuse for each in margins]
-    left += [left_of(path, path[0], wall, hull_m, side_m, grace) for wall in walls]
+    left += [left_of(path, path[0], wall, obstacle_clearance_m, side_m, grace) for wall in walls]
     drift = drift_m * np.arange(last + 1)  # no less than any current of that speed can do
     left = [each - drift for each in left]
     assert out[MARGIN] == pytest.approx(min(each.min() for each in left), abs=1e-9)
@@ -134,17 +136,17 @@ WALL = np.array([[-5.0, 0.0, 5.0, 0.0]])
 def test_a_wall_that_no_sample_is_near_is_not_gone_through():
     """Samples 0.5 m before a wall and 0.5 m behind it, of a boat of 0.2 m."""
     path = np.array([[0.0, -1.5], [0.0, -0.5], [0.0, 0.5], [0.0, 1.5]])
-    out = clear_of_obstacles(path, things(walls=WALL, hull_m=0.2))
+    out = clear_of_obstacles(path, things(walls=WALL, obstacle_clearance_m=0.2))
     assert out[[MARGIN, SAMPLE, NORMAL_Y]] == pytest.approx([-1.7, 3, -1.0])
     aside = path + np.array([5.5, 0.0])
-    assert clear_of_obstacles(aside, things(walls=WALL, hull_m=0.2))[MARGIN] > 0.0  # past its end
+    assert clear_of_obstacles(aside, things(walls=WALL, obstacle_clearance_m=0.2))[MARGIN] > 0.0  # past its end
 
 
 @pytest.mark.parametrize("side_m", [0.0, 0.3])
 def test_a_boat_too_near_to_a_wall_may_leave_it_on_its_side_and_on_either_when_that_is_not_known(side_m):
     for way in (1.0, -1.0):
         path = np.column_stack([np.zeros(20), -0.1 + way * np.linspace(0.0, 6.0, 20)])
-        out = clear_of_obstacles(path, things(walls=WALL, hull_m=0.7, side_m=side_m))
+        out = clear_of_obstacles(path, things(walls=WALL, obstacle_clearance_m=0.7, side_m=side_m))
         if way < 0.0 or side_m > 0.1:
             assert out[MARGIN] >= -0.1
         else:
@@ -183,6 +185,6 @@ def test_the_edge_counts_only_as_long_as_it_is_looked_at():
 
 def test_nothing_there_is_far_away():
     path = np.zeros((5, 2))
-    assert clear_of_obstacles(path, things(hull_m=1.0), drift_m=0.3)[MARGIN] == FAR
+    assert clear_of_obstacles(path, things(obstacle_clearance_m=1.0), drift_m=0.3)[MARGIN] == FAR
     assert clear_of_all(path, things(), drift_m=0.3)[MARGIN] == FAR
     assert clear_of_all(path, things(field=np.array([-1e9, -1e9, 1e9, 1e9])), drift_m=0.3)[MARGIN] == FAR

@@ -36,7 +36,7 @@ def opponent(x, y, heading_deg):
 
 def stages(*rows, other="surveyor", **settings):
     at = stages_of(
-        ShieldConfig(**{"profile": "rammers", "margin_cap_m": 50.0, **settings}),
+        ShieldConfig(**{"profile": "ramming", "margin_cap_m": 50.0, **settings}),
         np.array(rows),
         ["surveyor"] + [other] * (len(rows) - 1),
         [0] + [1] * (len(rows) - 1),
@@ -83,7 +83,7 @@ def nimble(thrust, speed_mps, *others):
     row[[L.THRUST, L.SPEED_ERROR, L.HEADING_ERROR]] = thrust, 2.0 - speed_mps, 0.0
     rows = np.array([row, *others])
     at = stages_of(
-        ShieldConfig(profile="rammers", margin_cap_m=50.0), rows, ["heron"] * len(rows), [0] + [1] * (len(rows) - 1)
+        ShieldConfig(profile="ramming", margin_cap_m=50.0), rows, ["heron"] * len(rows), [0] + [1] * (len(rows) - 1)
     )
     find_neighbours(at.scene)
     return at
@@ -122,7 +122,7 @@ def test_who_comes_near_only_while_thrust_is_built_up_is_seen_coming():
 def test_it_makes_no_difference_on_which_side_of_enough_the_thrust_is(wanted_mps):
     """Else margins would drop in the step in which a boat that slows down comes to have less."""
     random, drops = np.random.default_rng(5), []
-    enough = stages_of(ShieldConfig(profile="rammers"), np.array([slow_boat()]), ["heron"], [0]).boats.ready_thrust[0]
+    enough = stages_of(ShieldConfig(profile="ramming"), np.array([slow_boat()]), ["heron"], [0]).boats.ready_thrust[0]
     for _ in range(300):
         angle, far, heading = (
             random.uniform(-math.pi, math.pi),
@@ -131,26 +131,26 @@ def test_it_makes_no_difference_on_which_side_of_enough_the_thrust_is(wanted_mps
         )
         other = fresh_state(far * math.sin(angle), far * math.cos(angle), heading, random.uniform(0.5, 2.0))
         more, less = (
-            certificate_m(nimble(thrust, 1.7, other).state, wanted_mps) for thrust in (enough + 0.1, enough - 0.1)
+            safety_margin_m(nimble(thrust, 1.7, other).state, wanted_mps) for thrust in (enough + 0.1, enough - 0.1)
         )
         drops.append(abs(more - less))
     assert np.median(drops) < 0.06
     assert np.percentile(drops, 90) < 0.3
 
 
-def certificate_m(state, wanted_mps):
+def safety_margin_m(state, wanted_mps):
     """What a batch of one game tells of its first boat."""
-    shield = BatchedShield(ShieldConfig(profile="rammers"), 1, ("heron", "heron"), (0, 1))
+    shield = BatchedShield(ShieldConfig(profile="ramming"), 1, ("heron", "heron"), (0, 1))
     wanted = np.array([[[wanted_mps, 0.0], [2.0, 0.0]]])
     shield.decide(state[None].copy(), wanted, np.array([[True, False]]))
-    return min(float(shield.certificate_m[0, 0]), 2.0)
+    return min(float(shield.safety_margin_m[0, 0]), 2.0)
 
 
 def test_a_boat_that_is_always_slow_is_at_full_thrust_with_what_it_has():
     slow = replace(get_platform("heron"), name="slow_heron", max_speed_mps=1.7)
     steady = limits_of(slow).thrust
     assert 80.0 < steady < 85.0
-    boats = boats_of(ShieldConfig(profile="rammers"), (slow, slow), (0, 1))
+    boats = boats_of(ShieldConfig(profile="ramming"), (slow, slow), (0, 1))
     assert boats.ready_thrust[0] == pytest.approx(0.85 * steady)
 
 
@@ -169,14 +169,16 @@ def chased(certificate, count=40, steps=500):
         game[0] = slow_boat(rng.uniform(0.5, 2.0), 30.0)
         angle, far = rng.uniform(-math.pi, math.pi), rng.uniform(10.0, 60.0)
         game[1] = opponent(far * math.sin(angle), far * math.cos(angle), math.degrees(angle) + 180.0)
-    shield = BatchedShield(ShieldConfig(profile="rammers", certificate=certificate), count, ("surveyor",) * 2, (0, 1))
+    shield = BatchedShield(
+        ShieldConfig(profile="ramming", opponent_model=certificate), count, ("surveyor",) * 2, (0, 1)
+    )
     ours, closest, first = np.tile([True, False], (count, 1)), np.full(count, math.inf), None
     for _ in range(steps):
         wanted = np.zeros((count, 2, 2))
         wanted[:, :, 0] = 3.0
         wanted[:, 1, 1] = bearing_to_quarry(state)
         sent = shield.decide(state, wanted, ours)
-        first = shield.certificate_m[:, 0].copy() if first is None else first
+        first = shield.safety_margin_m[:, 0].copy() if first is None else first
         step_all(np.array([params, params]), state, sent, 0.1)
         closest = np.minimum(closest, np.linalg.norm(state[:, 0, :2] - state[:, 1, :2], axis=1))
     return first, closest

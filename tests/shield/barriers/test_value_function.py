@@ -31,8 +31,8 @@ def apart(x, y, heading, own_mps=3.0, other_mps=3.0, kind="surveyor", percent=10
 
 
 def answers(fleet, **settings):
-    decisions = Shield(**{"profile": "rammers", **settings}).decide(fleet, relative((3.0, 0.0), (3.0, 0.0)))
-    return decisions.sent.values.tolist(), decisions.reason.tolist(), decisions.certificate_m.tolist()
+    decisions = Shield(**{"profile": "ramming", **settings}).decide(fleet, relative((3.0, 0.0), (3.0, 0.0)))
+    return decisions.filtered.values.tolist(), decisions.reason.tolist(), decisions.safety_margin_m.tolist()
 
 
 def looked_up_by_hand(fleet):
@@ -77,11 +77,11 @@ def test_a_gap_between_two_that_lie_still_is_seen_as_one():
     """Tables are about one boat at a time: each of the two can be passed, both together cannot."""
     rows = [(0, 0, 0, 3), (-2.4, 25.0, 90, 0), (2.4, 25.0, 90, 0)]
     fleet = at_thrust(fleet_of(rows, [0, 1, 1], "surveyor"), 100.0)
-    shield, state = Shield(profile="rammers"), fleet.state.copy()
+    shield, state = Shield(profile="ramming"), fleet.state.copy()
     least = math.inf
     for _ in range(250):
         decisions = shield.decide(replace(fleet, state=state.copy()), relative((3.0, 0.0), (0.0, 0.0), (0.0, 0.0)))
-        step_boat(SURVEYOR.pack(), state[0], *decisions.sent.values[0], 0.1)
+        step_boat(SURVEYOR.pack(), state[0], *decisions.filtered.values[0], 0.1)
         least = min(least, np.hypot(*(state[1:, :2] - state[0, :2]).T).min())
     assert least > 2.5
 
@@ -95,15 +95,15 @@ def test_a_gap_between_two_that_lie_still_is_seen_as_one():
     ids=["nimble boats", "a radius beyond the table"],
 )
 def test_where_no_table_answers_opponents_are_run_through(fleet, settings):
-    same = {"table_response_per_s": 1.0, **settings}  # the rate is the boat's, whoever answers
-    assert answers(fleet, **same) == answers(fleet, certificate="turning_circle", **same)
+    same = {"table_cbf_rate_per_s": 1.0, **settings}  # the rate is the boat's, whoever answers
+    assert answers(fleet, **same) == answers(fleet, opponent_model="turning_circle", **same)
 
 
 def test_boats_that_lack_the_thrust_the_table_is_for_are_run_through():
     """The run lasts a little longer than without a table: until thrust is what the table needs."""
     fleet = apart(1.0, 24.0, 180.0, percent=40.0)
-    sent, reason, certificate = answers(fleet, table_response_per_s=1.0)
-    same = answers(fleet, table_response_per_s=1.0, certificate="turning_circle")
+    sent, reason, certificate = answers(fleet, table_cbf_rate_per_s=1.0)
+    same = answers(fleet, table_cbf_rate_per_s=1.0, opponent_model="turning_circle")
     assert (sent, reason) == same[:2]
     assert certificate == pytest.approx(same[2], abs=0.05)
     assert certificate[0] < 0.0
@@ -111,14 +111,14 @@ def test_boats_that_lack_the_thrust_the_table_is_for_are_run_through():
 
 def test_nimble_boats_are_looked_up_when_asked_for():
     fleet = apart(1.0, 6.5, 180.0, 2.0, 2.0, "heron")
-    assert answers(fleet, certificate="value_table") != answers(fleet, certificate="auto")
+    assert answers(fleet, opponent_model="value_table") != answers(fleet, opponent_model="auto")
 
 
 def test_a_boat_without_a_table_is_run_through_and_the_log_says_so(caplog):
     stranger = replace(SURVEYOR, name="surveyor_lighter", max_acc=0.16)
     fleet = replace(apart(1.0, 24.0, 180.0), platforms=(stranger, stranger))
-    same = {"table_response_per_s": 1.0}
-    assert answers(fleet, **same) == answers(fleet, certificate="turning_circle", **same)
+    same = {"table_cbf_rate_per_s": 1.0}
+    assert answers(fleet, **same) == answers(fleet, opponent_model="turning_circle", **same)
     assert "steerclear reach solve --own surveyor_lighter" in caplog.text
 
 
@@ -129,11 +129,11 @@ def test_decisions_name_the_opponents_without_a_table():
     fleet = replace(fleet, platforms=("surveyor", "heron", "surveyor", stranger))
     wanted = relative(*[(2.0, 0.0)] * 4)
     told = {
-        certificate: Shield(certificate=certificate).decide(fleet, wanted) for certificate in ("auto", "value_table")
+        certificate: Shield(opponent_model=certificate).decide(fleet, wanted) for certificate in ("auto", "value_table")
     }
     assert [d.no_table for d in told["auto"]] == [("boat_3",), (), (), ()]  # herons are not looked up, opponents never
     assert [d.no_table for d in told["value_table"]] == [("boat_3",), ("boat_3",), (), ()]
-    tame = Shield(profile="hold-course").decide(fleet, wanted)  # no table is wanted
+    tame = Shield(profile="constant_velocity").decide(fleet, wanted)  # no table is wanted
     assert [d.no_table for d in tame] == [()] * 4
 
 
@@ -153,7 +153,7 @@ def chased(count, seed):
         game[0] = fresh_state(0.0, 0.0, rng.uniform(-180, 180), 3.0)
         game[1] = fresh_state(distance * math.sin(bearing), distance * math.cos(bearing), rng.uniform(-180, 180), 3.0)
         game[:, L.THRUST] = 100.0
-    guard = BatchedShield(ShieldConfig(profile="rammers"), count, ("surveyor", "surveyor"), (0, 1))
+    guard = BatchedShield(ShieldConfig(profile="ramming"), count, ("surveyor", "surveyor"), (0, 1))
     ours, least = np.tile([True, False], (count, 1)), np.full(count, math.inf)
     for _ in range(450):
         gap = state[:, 0, [L.X, L.Y]] - state[:, 1, [L.X, L.Y]]

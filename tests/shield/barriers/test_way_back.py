@@ -29,7 +29,7 @@ def sailed(platform, state, wanted_share, wanted_deg, seconds=LONG_S, **around):
 
     around = Surroundings(**around)
     return sail_games(
-        ShieldConfig(hull_m=0.0), state, [platform], [0], wanted, 10 * seconds, surroundings=around
+        ShieldConfig(obstacle_clearance_m=0.0), state, [platform], [0], wanted, 10 * seconds, surroundings=around
     ).position[:, :, 0]
 
 
@@ -73,7 +73,7 @@ def test_in_an_obstacle_nobody_goes_deeper_and_who_wants_out_may(kind, wanted_sh
 def test_a_boat_chased_out_over_a_corner_goes_round_its_pursuer_and_comes_back():
     """One at 0.7 of its speed: by each side alone it turned to and fro between the two, 88 m out."""
     kinds, team, field = ("heron",) * 2, (0, 1), (0.0, 0.0, 80.0, 40.0)
-    config = ShieldConfig(profile="rammers")
+    config = ShieldConfig(profile="ramming")
     state = scattered(np.random.default_rng(0), 4, kinds, 10.0, gap_m=4.0)
     state[:, :, L.X] = [[81.0, 78.0], [82.0, 80.0], [-1.0, 2.0], [82.0, 78.0]]
     state[:, :, L.Y] = [[41.0, 38.0], [42.0, 38.0], [-1.0, 2.0], [-2.0, 2.0]]

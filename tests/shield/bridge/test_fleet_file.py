@@ -166,14 +166,22 @@ def test_the_fence_holds_what_is_inside():
 
 
 def test_on_the_water_margins_from_team_mates_shrink_as_slowly_as_others():
-    assert parse_fleet(GOOD).shield_config.mate_cap_m == ShieldConfig().margin_cap_m > ShieldConfig().mate_cap_m
-    for setting, follows in (("mate_cap_m: 0.5", 0.5), ("margin_cap_m: 1.0", 1.0)):
+    assert (
+        parse_fleet(GOOD).shield_config.teammate_margin_cap_m
+        == ShieldConfig().margin_cap_m
+        > ShieldConfig().teammate_margin_cap_m
+    )
+    for setting, follows in (("teammate_margin_cap_m: 0.5", 0.5), ("margin_cap_m: 1.0", 1.0)):
         told = parse_fleet(GOOD.replace("team: blue", f"team: blue\nshield: {{{setting}}}", 1))
-        assert told.shield_config.mate_cap_m == follows
+        assert told.shield_config.teammate_margin_cap_m == follows
 
 
 def test_on_water_opponents_are_taken_for_rammers_unless_the_file_says_otherwise():
-    assert parse_fleet(GOOD).shield_config.feared_s == math.inf
-    for setting, feared_s in (("profile: players", 12.0), ("adversary_s: 12.0", 12.0), ("profile: hold-course", 0.0)):
+    assert parse_fleet(GOOD).shield_config.effective_adversary_horizon_s == math.inf
+    for setting, adversary_horizon_s in (
+        ("profile: competitive", 12.0),
+        ("adversary_horizon_s: 12.0", 12.0),
+        ("profile: constant_velocity", 0.0),
+    ):
         told = parse_fleet(GOOD.replace("team: blue", f"team: blue\nshield: {{{setting}}}", 1))
-        assert told.shield_config.feared_s == feared_s
+        assert told.shield_config.effective_adversary_horizon_s == adversary_horizon_s

@@ -156,8 +156,8 @@ def test_nothing_is_taken_for_something_else(old, new, place):
 
 
 def test_the_shield_may_be_given_endless_times():
-    fleet = parse_fleet(GOOD + "\nshield: {give_way_after_s: .inf}")
-    assert fleet.shield_config.give_way_after_s == math.inf
+    fleet = parse_fleet(GOOD + "\nshield: {deadlock_timeout_s: .inf}")
+    assert fleet.shield_config.deadlock_timeout_s == math.inf
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "[::1]", "[fe80::1%eth0]", "localhost", "boat-1.local", "a1.b2", "1a"])

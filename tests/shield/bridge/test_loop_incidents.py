@@ -139,7 +139,7 @@ def test_a_wall_clock_that_steps_by_an_hour_changes_nothing(monkeypatch):
 
     stepped.run(6.0, strike)
     for before, after in zip(plain.sink.ticks, stepped.sink.ticks, strict=True):
-        np.testing.assert_array_equal(before.decisions.sent.values, after.decisions.sent.values)
+        np.testing.assert_array_equal(before.decisions.filtered.values, after.decisions.filtered.values)
         assert before.actions == after.actions
 
 

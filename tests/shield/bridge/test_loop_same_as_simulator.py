@@ -50,7 +50,7 @@ def simulate(fleet, grounds=OPEN_WATER):
         around = Surroundings(fleet.geofence.box, grounds.circles, grounds.polygons, stops=grounds.stops)
         answer = shield.decide(now, Commands.absolute_rad(wanted_at(k)), around)
         changed += answer.count_intervened
-        own = [answer.sent.absolute(i, now.heading_rad[i]) for i in range(3)]
+        own = [answer.filtered.absolute(i, now.heading_rad[i]) for i in range(3)]
         sent.append(own)
         queue.append([(speed, float(np.degrees(heading))) for speed, heading in own])
         works = queue.pop(0)
@@ -103,7 +103,7 @@ def test_the_same_states_give_the_same_commands_bit_for_bit(late_steps, grounds)
     expected, changed = simulate(fleet, grounds)
     world = run_loop(fleet, late_steps, grounds)
     decided = [
-        [tick.decisions.sent.absolute(i, tick.fleet.heading_rad[i]) for i in range(3)] for tick in world.sink.ticks
+        [tick.decisions.filtered.absolute(i, tick.fleet.heading_rad[i]) for i in range(3)] for tick in world.sink.ticks
     ]
     np.testing.assert_array_equal(np.array(decided), expected)
     left = [[entry[1:] for entry in link.sent] for link in world.links.values()]

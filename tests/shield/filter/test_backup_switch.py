@@ -25,7 +25,7 @@ COLUMNS = {
 
 
 def test_a_boat_that_passed_goes_back_to_its_backup_when_another_needs_the_room():
-    """Its backup after the wanted command lies where the other's has to go; 2.34 m apart without, in half a second."""
+    """Its backup after the nominal command lies where the other's has to go; 2.34 m apart without, in half a second."""
     scene = json.loads(DOORWAY.read_text())
     state = np.array(scene["state"])[None]
     n = state.shape[1]

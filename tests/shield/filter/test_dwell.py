@@ -28,7 +28,8 @@ def _closest_m(film: Trajectory) -> float:
 
 def test_a_rate_boat_that_is_rammed_is_turned_back_half_as_often():
     without, with_it = (
-        [_rammed("ardurover_boat", number, guard) for number in range(4)] for guard in ("shield:dwell_s=0", "shield")
+        [_rammed("ardurover_boat", number, guard) for number in range(4)]
+        for guard in ("shield:min_backup_hold_s=0", "shield")
     )
     assert min(map(_closest_m, [*without, *with_it])) >= 2.5
     before, after = (sum(map(_times_turned_back, films)) for films in (without, with_it))
@@ -37,7 +38,7 @@ def test_a_rate_boat_that_is_rammed_is_turned_back_half_as_often():
 
 
 def test_a_backup_is_left_only_when_its_time_is_over_or_the_opponent_is_far():
-    film = _rammed("ardurover_boat", 1, "shield:dwell_s=1")
+    film = _rammed("ardurover_boat", 1, "shield:min_backup_hold_s=1")
     backing_up = film.reason[:, 0, 0] == Reason.BACKUP
     starts = np.flatnonzero(backing_up & ~np.r_[True, backing_up[:-1]])
     ends = np.flatnonzero(~backing_up & np.r_[False, backing_up[:-1]])
@@ -51,5 +52,5 @@ def test_a_backup_is_left_only_when_its_time_is_over_or_the_opponent_is_far():
 @settings(max_examples=3, deadline=None)
 @given(number=st.integers(0, 500), platform=st.sampled_from(["heron", "surveyor"]))
 def test_other_boats_decide_as_ever(number, platform):
-    longer, none = (_rammed(platform, number, f"shield:dwell_s={dwell}") for dwell in (5, 0))
+    longer, none = (_rammed(platform, number, f"shield:min_backup_hold_s={dwell}") for dwell in (5, 0))
     np.testing.assert_array_equal(longer.filtered, none.filtered)

@@ -34,7 +34,7 @@ def chase(step, state):
 
 @pytest.mark.parametrize("platform", ["heron", "ardurover_boat"])
 def test_no_boat_goes_farther_beyond_the_line_than_it_takes_to_stop(platform):
-    shield = Shield(profile="rammers", beyond_m=4.5, beyond_then="stop", surroundings=Surroundings(field=FIELD))
+    shield = Shield(profile="ramming", beyond_m=4.5, beyond_then="stop", surroundings=Surroundings(field=FIELD))
     run = sail(shield, fleet_at(84.0, 20.0, behind_m=3.0, platform=platform), chase, 150)
     out_m = run.position[:, 0, 0] - FIELD[2]
     assert 4.5 < out_m.max() <= 4.5 + STOP_WAY_M[platform]
@@ -47,7 +47,7 @@ def test_no_boat_goes_farther_beyond_the_line_than_it_takes_to_stop(platform):
 def test_who_may_flee_does_as_without_a_line():
     around = Surroundings(field=FIELD)
     runs = [
-        sail(Shield(profile="rammers", surroundings=around, **more), fleet_at(84.0, 20.0, behind_m=3.0), chase, 100)
+        sail(Shield(profile="ramming", surroundings=around, **more), fleet_at(84.0, 20.0, behind_m=3.0), chase, 100)
         for more in ({}, {"beyond_m": 3.0}, {"beyond_m": 3.0, "beyond_then": "flee"})
     ]
     assert runs[0].position[:, 0, 0].max() > FIELD[2] + 5.0
@@ -60,7 +60,7 @@ def test_nobody_is_driven_ashore(platform):
     around = Surroundings(field=FIELD, polygons=[SHORE])
     touched = {}
     for then in ("flee", "stop"):
-        shield = Shield(profile="rammers", beyond_then=then, surroundings=around)
+        shield = Shield(profile="ramming", beyond_then=then, surroundings=around)
         run = sail(shield, fleet_at(70.0, 20.0, platform=platform), chase, 300)
         touched[then] = (run.position[:, 0, 0] > SHORE[0][0] - 0.5).any(), (run.reason[:, 0] == Reason.STOPPED).any()
     assert touched["stop"][0] == False  # noqa: E712 - numpy's
@@ -70,7 +70,7 @@ def test_nobody_is_driven_ashore(platform):
 def test_a_wall_is_stopped_before_that_no_other_rule_keeps():
     """A boat told to go on into a corner of walls by opponents on all sides stops."""
     around = Surroundings(polygons=[SHORE])
-    shield = Shield(profile="rammers", beyond_then="stop", surroundings=around)
+    shield = Shield(profile="ramming", beyond_then="stop", surroundings=around)
     start = Fleet.of(
         position_m=[(80.0, 20.0), (77.0, 23.0), (77.0, 17.0), (76.5, 20.0)],
         heading_deg=[90.0] * 4,
@@ -83,7 +83,7 @@ def test_a_wall_is_stopped_before_that_no_other_rule_keeps():
 
 
 def test_a_batch_stops_the_same_boats():
-    config = ShieldConfig(profile="rammers", beyond_m=2.0, beyond_then="stop")
+    config = ShieldConfig(profile="ramming", beyond_m=2.0, beyond_then="stop")
     around = Surroundings(field=(0.0, 0.0, 25.0, 25.0), polygons=[SHORE])
     kinds, team = ("heron",) * 4, (0, 0, 1, 1)
     state = scattered(np.random.default_rng(3), 3, kinds, 25.0, gap_m=5.0)
@@ -115,7 +115,12 @@ def test_a_decision_says_how_far_outside_and_that_it_stops():
     decisions = shield.decide(fleet, Commands.relative_deg([(2.0, 180.0), (2.0, 0.0)]))
     out, inside = decisions
     assert (out.outside_m, inside.outside_m) == (7.0, 0.0)
-    assert (out.reason, out.fallback, out.binding, out.sent_speed_mps) == (Reason.STOPPED, "stop", ("field",), 0.0)
+    assert (out.reason, out.fallback, out.active_constraints, out.filtered_speed_mps) == (
+        Reason.STOPPED,
+        "stop",
+        ("field",),
+        0.0,
+    )
     assert inside.reason == Reason.PASSED
     assert Shield().decide(fleet, Commands.relative_deg([(1.0, 0.0)] * 2)).outside_m.tolist() == [0.0, 0.0]
 

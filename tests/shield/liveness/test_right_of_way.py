@@ -1,4 +1,4 @@
-"""Team-mates that keep each other from turning: one gives way, and both get where they want."""
+"""Teammates that keep each other from turning: one gives way, and both get where they want."""
 
 import logging
 from dataclasses import replace
@@ -50,7 +50,7 @@ def on_a_circle(boats, turned_rad):
 def test_boats_that_cross_in_the_middle_all_arrive():
     random = np.random.default_rng(0)
     angle = on_a_circle(3, random.uniform(0.0, 6.0, 6)) + random.normal(size=(6, 3)) / 80.0
-    never, _ = to_the_other_side("surveyor", angle, 80.0, 1200, give_way_after_s=np.inf)
+    never, _ = to_the_other_side("surveyor", angle, 80.0, 1200, deadlock_timeout_s=np.inf)
     assert np.isinf(never[..., 0]).any(), "without right of way two sail on side by side: or this test shows nothing"
     at, run = to_the_other_side("surveyor", angle, 80.0, 1200)
     assert at[..., 0].max() < 1150
@@ -66,8 +66,8 @@ def test_how_many_cross_and_come_back(platform, radius_m, boats):
     random = np.random.default_rng(0)
     angle = on_a_circle(boats, random.uniform(0.0, 6.0, 20)) + random.normal(size=(20, boats)) / radius_m
     stuck = []
-    for after_s in (np.inf, ShieldConfig().give_way_after_s):
-        at, run = to_the_other_side(platform, angle, radius_m, 2400, give_way_after_s=after_s)
+    for after_s in (np.inf, ShieldConfig().deadlock_timeout_s):
+        at, run = to_the_other_side(platform, angle, radius_m, 2400, deadlock_timeout_s=after_s)
         lost = int(np.isinf(at[..., 0]).sum())
         stuck.append(lost)
         LOG.warning(
@@ -143,18 +143,18 @@ def test_the_decision_names_the_other():
     sail(shield, fleet, wanted, 60)
     said = [decision for decisions in found for decision in decisions if decision.reason is Reason.RIGHT_OF_WAY]
     assert said
-    assert all({decision.boat, *decision.binding} == {*fleet.names} for decision in said)
-    assert all(decision.intervened and decision.certificate_m >= 0.0 for decision in said)
+    assert all({decision.boat, *decision.active_constraints} == {*fleet.names} for decision in said)
+    assert all(decision.intervened and decision.safety_margin_m >= 0.0 for decision in said)
 
 
 def test_it_can_be_switched_off():
-    run = press_together(abreast(), 200, give_way_after_s=np.inf)
+    run = press_together(abreast(), 200, deadlock_timeout_s=np.inf)
     assert not (run.reason == Reason.RIGHT_OF_WAY).any()
 
 
 @pytest.mark.parametrize(("thrust", "starboard_m"), [(20.0, 3.6), (100.0, 4.3), (100.0, 3.0)])
 def test_a_boat_that_turns_slowly_but_turns_is_left_alone(thrust, starboard_m):
-    """Its turn was changed once, by a team-mate that then made room: from then on what it wants passes."""
+    """Its turn was changed once, by a teammate that then made room: from then on what it wants passes."""
     fleet = abreast("surveyor", starboard_m=starboard_m)
     state = fleet.state.copy()
     state[:, L.THRUST], state[:, L.SPEED] = thrust, 3.0
@@ -185,7 +185,7 @@ def test_boats_that_come_and_go_far_away_change_nothing_about_who_gives_way():
                 fleet = replace(far, state=np.concatenate([state, far.state[2:]]))
                 commands = np.concatenate([commands, [[2.0, 0.0]]])
             decisions = shield.decide(fleet, Commands.relative_deg(commands))
-            step_all(packed(near.platforms), state[None], decisions.sent.values[None, :2], 0.1)
+            step_all(packed(near.platforms), state[None], decisions.filtered.values[None, :2], 0.1)
             reasons.append(decisions.reason[:2].copy())
         runs.append((np.array(reasons), state))
     assert (runs[0][0] == Reason.RIGHT_OF_WAY).any()

@@ -72,7 +72,7 @@ def closest_m(name, seed, shielded=True):
         error = [math.degrees(0.0) - states[0, L.HEADING], 180.0 - states[1, L.HEADING]]
         wanted = np.array([[top, math.remainder(e, 360.0)] for e in error])
         fleet = Fleet(states.copy(), np.array([0, 1]), (name, name), np.array([True, False]), ("ours", "theirs"))
-        sent = shield.decide(fleet, Commands.relative_deg(wanted)).sent.values if shielded else np.radians(wanted)
+        sent = shield.decide(fleet, Commands.relative_deg(wanted)).filtered.values if shielded else np.radians(wanted)
         for i in range(2):
             command = sent[i] if i == 0 and shielded else wanted[i]
             step_boat(params, states[i], command[0], command[1], 0.1)

@@ -47,8 +47,8 @@ def loop(shield, fleet, see, absolute):
             error = (heading - state[:, L.HEADING] + 180.0) % 360.0 - 180.0
             wanted = relative(*np.stack([np.full(4, 1.6), error], axis=1))
         answer = shield.decide(see(now), wanted)
-        told.append(np.column_stack([answer.sent.values, answer.reason, answer.certificate_m]))
-        sent = answer.sent.as_relative_deg(state[:, L.HEADING])
+        told.append(np.column_stack([answer.filtered.values, answer.reason, answer.safety_margin_m]))
+        sent = answer.filtered.as_relative_deg(state[:, L.HEADING])
         late.append(np.stack([sent[:, 0], sent[:, 1] + state[:, L.HEADING]], axis=1))
         steps = round(shield.config.delay_s / shield.config.dt_s)
         if step < steps:
@@ -113,8 +113,8 @@ def test_boats_that_come_and_go_do_not_make_it_forget_the_others():
             return type(answer)(
                 boats,
                 wanted,
-                Commands(answer.sent.values[back], answer.sent.relative),
-                *(value[back] for value in (answer.intervened, answer.reason, answer.certificate_m, answer.slack_m)),
+                Commands(answer.filtered.values[back], answer.filtered.relative),
+                *(value[back] for value in (answer.intervened, answer.reason, answer.safety_margin_m, answer.slack_m)),
                 bound=answer.bound[back],
                 solve_time_s=answer.solve_time_s,
             )

@@ -38,8 +38,8 @@ def decisions(shield, fleet, seen_at):
         now = part(replace(fleet, state=state), boats)
         own = boats.index(0)
         answer = shield.decide(now, relative(*[(2.0, 0.0)] * len(boats)))
-        told.append((*answer.sent.values[own], answer.reason[own], answer.certificate_m[own]))
-        commands = np.array([answer.sent.values[own], (2.0, 0.0), (0.0, 0.0)])
+        told.append((*answer.filtered.values[own], answer.reason[own], answer.safety_margin_m[own]))
+        commands = np.array([answer.filtered.values[own], (2.0, 0.0), (0.0, 0.0)])
         step_all(params, state[None], commands[None], 0.1)
     return np.array(told)
 
@@ -66,7 +66,7 @@ def test_reset_forgets():
     scene = part(fleet, (0, 1, 2))
     scene.state[1, L.Y] = 9.0
     wanted = relative((2.0, 0.0), (2.0, 0.0), (0.0, 0.0))
-    assert bits(used.decide(scene, wanted).sent.values) == bits(fresh.decide(scene, wanted).sent.values)
+    assert bits(used.decide(scene, wanted).filtered.values) == bits(fresh.decide(scene, wanted).filtered.values)
 
 
 def memory_of(shield):
@@ -112,7 +112,7 @@ def test_a_copy_decides_on_its_own():
     fleet, wanted = head_on(9.0), relative((2.0, 0.0), (2.0, 0.0))
     first.decide(fleet, wanted)
     second = copy.deepcopy(first)
-    told = [[shield.decide(fleet, wanted).sent.values for _ in range(3)] for shield in (first, second)]
+    told = [[shield.decide(fleet, wanted).filtered.values for _ in range(3)] for shield in (first, second)]
     np.testing.assert_array_equal(*told)
     alone = Shield(delay_s=0.2)
-    np.testing.assert_array_equal([alone.decide(fleet, wanted).sent.values for _ in range(4)][1:], told[0])
+    np.testing.assert_array_equal([alone.decide(fleet, wanted).filtered.values for _ in range(4)][1:], told[0])

@@ -136,7 +136,7 @@ def test_obstacles_are_those_the_environment_has():
     reader = PyquaticusReader(game(obstacles=[circle, wall]))
     around = reader.surroundings(0, keep_out=True)
     assert (around.circles, around.polygons) == (((40.0, 20.0, 3.0),), (((1.0, 2.0), (3.0, 4.0), (5.0, 0.0)),))
-    assert reader.facts().hull_m() == 2.0
+    assert reader.facts().obstacle_clearance_m() == 2.0
 
 
 def test_the_own_flags_circle_is_there_where_the_game_has_one():

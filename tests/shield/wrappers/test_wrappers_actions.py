@@ -116,7 +116,7 @@ def in_wrapped_env(action):
     env = ShieldedParallelEnv(MctfEnv(GameConfig.preset("aamas2024", **RULES)), Shield())
     env.reset(seed=1)
     env.step({"agent_0": action})
-    return env.decisions.wanted.values[0]
+    return env.decisions.nominal.values[0]
 
 
 def in_wrapped_policy(action):
@@ -125,7 +125,7 @@ def in_wrapped_policy(action):
     team = ShieldedTeamPolicy(Answer(action), Shield())
     team.reset(env, ["agent_0"], 0)
     env.step(team.act(observations, infos))
-    return team.decisions.wanted.values[0]
+    return team.decisions.nominal.values[0]
 
 
 def in_foreign_code(action):
@@ -147,7 +147,7 @@ def in_pyquaticus(action):
     env.step({"agent_0": action})
     given = env.unwrapped.stepped[0]["agent_0"]
     assert type(given) is int or (isinstance(given, (list, tuple, np.ndarray)) and len(given) == 2)
-    return env.decisions.wanted.values[0]
+    return env.decisions.nominal.values[0]
 
 
 def in_a_batch(action):
@@ -209,7 +209,7 @@ def test_boats_without_an_action_stop_and_unknown_ones_are_refused(make):
     env = ShieldedParallelEnv(make(), Shield())
     env.reset(seed=0)
     env.step({})
-    assert env.decisions[0].wanted_speed_mps == 0.0
+    assert env.decisions[0].nominal_speed_mps == 0.0
     assert env.decisions[0].reason == Reason.PASSED
     with pytest.raises(SteerclearError, match=r"unknown agent 'agent_7' in the actions; agents are agent_0, agent_1"):
         env.step({"agent_7": 4})

@@ -92,7 +92,7 @@ def test_a_filter_of_the_users_own_is_asked_first_and_stays():
     wrapped = ShieldedParallelEnv(game, Shield())
     wrapped.reset(seed=3)
     wrapped.step(dict.fromkeys(game.possible_agents, STRAIGHT))
-    np.testing.assert_array_equal(wrapped.decisions.wanted.values[:, 0], 0.5 * seen[0][0, :, 0])
+    np.testing.assert_array_equal(wrapped.decisions.nominal.values[:, 0], 0.5 * seen[0][0, :, 0])
     assert game.command_filter is half
 
 
@@ -153,8 +153,8 @@ def test_a_pyquaticus_environment_is_as_it_was_after_wrapping_and_after_a_step()
     assert env.decisions.intervened[0]
     assert env.env.decisions.intervened[1]
     assert [tuple(game.moved[0][agent]) for agent in game.agents] == [
-        tuple(env.decisions.sent.values[0]),
-        tuple(env.env.decisions.sent.values[1]),
+        tuple(env.decisions.filtered.values[0]),
+        tuple(env.env.decisions.filtered.values[1]),
     ]
     game.step({"agent_0": STRAIGHT, "agent_1": STRAIGHT})
     assert game.moved[1]["agent_0"].tolist() == [1.5, 0.0], "stepped itself it is bare"

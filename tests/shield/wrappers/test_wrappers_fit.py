@@ -94,10 +94,12 @@ def test_the_distance_is_that_of_the_teams_boats(told):
 
 def test_boats_keep_off_obstacles_by_their_radius(told):
     env = game("mctf2025", obstacles=ISLAND)
-    assert ShieldedParallelEnv(env, Shield()).shield.config.hull_m == 2.0
-    assert ShieldedParallelEnv(env, Shield(hull_m=1.0)).shield.config.hull_m == 1.0
-    assert "keeps 1 m (hull_m), but this game has boats hit its obstacles at 2 m" in told.text
-    assert ShieldedParallelEnv(game("mctf2025"), Shield()).shield.config.hull_m == 1.0, "no obstacle, no hull"
+    assert ShieldedParallelEnv(env, Shield()).shield.config.obstacle_clearance_m == 2.0
+    assert ShieldedParallelEnv(env, Shield(obstacle_clearance_m=1.0)).shield.config.obstacle_clearance_m == 1.0
+    assert "keeps 1 m (obstacle_clearance_m), but this game has boats hit its obstacles at 2 m" in told.text
+    assert ShieldedParallelEnv(game("mctf2025"), Shield()).shield.config.obstacle_clearance_m == 1.0, (
+        "no obstacle, no hull"
+    )
 
 
 @pytest.mark.parametrize(
@@ -107,7 +109,7 @@ def test_a_shield_for_a_game_has_its_step_and_distances(build, told):
     config = GameConfig.preset("mctf2025", dt_s=0.2, obstacles=ISLAND)
     shield = Shield.for_game(build(config), current_mps=0.1)
     found = shield.config
-    assert (found.dt_s, found.separation_m, found.hull_m, found.current_mps) == (0.2, 4.0, 2.0, 0.1)
+    assert (found.dt_s, found.separation_m, found.obstacle_clearance_m, found.current_mps) == (0.2, 4.0, 2.0, 0.1)
     told.clear()
     game_facts._log_once.cache_clear()
     assert wrap_env(MctfEnv(config), shield) is shield

@@ -76,7 +76,7 @@ def test_decisions_are_of_the_moment_they_were_made():
         before_deg = env.unwrapped.view().heading_deg[0]
         *_, infos = env.step(dict.fromkeys(env.agents, 2))  # 90 deg to starboard
         decision = infos["agent_0"]["shield"]
-        assert math.degrees(decision.wanted_heading_rad) == pytest.approx((before_deg + 90.0) % 360.0)
+        assert math.degrees(decision.nominal_heading_rad) == pytest.approx((before_deg + 90.0) % 360.0)
         assert env.unwrapped.view().heading_deg[0] != before_deg
 
 
@@ -151,9 +151,9 @@ def test_pyquaticus_gets_the_corrected_pair_and_everything_else_as_it_was():
     sent, decision = game.moved[0], infos["agent_0"]["shield"]
     assert sent["agent_1"].tolist() == [1.5, 0.0]
     assert decision.intervened
-    assert decision.wanted_speed_mps == 1.5
-    assert sent["agent_0"][0] == decision.sent_speed_mps
-    turn_deg = math.degrees(decision.sent_heading_rad - decision.wanted_heading_rad)
+    assert decision.nominal_speed_mps == 1.5
+    assert sent["agent_0"][0] == decision.filtered_speed_mps
+    turn_deg = math.degrees(decision.filtered_heading_rad - decision.nominal_heading_rad)
     assert (sent["agent_0"][1] - turn_deg + 180.0) % 360.0 == pytest.approx(180.0)
 
 
@@ -166,8 +166,8 @@ def test_pyquaticus_actions_of_any_kind_are_read_and_pass_when_safe(action):
     assert game.stepped[0]["agent_0"] is action
     asked = {STRAIGHT: (1.5, 90.0), STOP: (0.0, 90.0), "HOME": (1.0, 270.0)}
     speed, heading = (0.7, 110.0) if isinstance(action, np.ndarray) else asked[action]
-    assert env.decisions[0].wanted_speed_mps == pytest.approx(speed)
-    assert math.degrees(env.decisions[0].wanted_heading_rad) == pytest.approx(heading)
+    assert env.decisions[0].nominal_speed_mps == pytest.approx(speed)
+    assert math.degrees(env.decisions[0].nominal_heading_rad) == pytest.approx(heading)
 
 
 def test_pyquaticus_boats_that_the_game_drives_are_not_decided_for():

@@ -62,15 +62,15 @@ def test_the_decisions_are_those_of_a_shielded_env():
         seen = likewise = observations, infos
         for i, agent in enumerate(OWN):
             mine, theirs = team.decisions[i], shielded_infos[agent]["shield"]
-            assert (mine.reason, mine.binding) == (theirs.reason, theirs.binding)
+            assert (mine.reason, mine.active_constraints) == (theirs.reason, theirs.active_constraints)
         # actions outside the env are float32, commands inside its step are not
         np.testing.assert_allclose(env.view().position, inner.view().position, atol=1e-4)
     assert (env.view().position[0] != start[0]).any()
 
 
 def test_what_is_wrapped_says_what_its_shield_keeps():
-    kept = "Shield(separation_m=4, profile='rammers', dt_s=0.1)"
-    settings = {"separation_m": 4.0, "profile": "rammers"}
+    kept = "Shield(separation_m=4, profile='ramming', dt_s=0.1)"
+    settings = {"separation_m": 4.0, "profile": "ramming"}
     assert repr(Shield(**settings).wrap(policies.make("medium"))) == f"<shielded medium: {kept}>"
     assert repr(Shield(**settings).wrap(crowd, read=straight)) == f"<shielded crowd: {kept}>"
     env = repr(ShieldedParallelEnv(crowd()[0], Shield(**settings), team="red"))
@@ -123,7 +123,7 @@ def near(gap_m):
 
 def test_a_function_of_what_is_seen_gets_a_shield_too():
     wanted = Commands.absolute_rad([[2.0, 0.0], [2.0, np.pi]])
-    team = Shield(profile="rammers").wrap(lambda gap_m: wanted, read=near)
+    team = Shield(profile="ramming").wrap(lambda gap_m: wanted, read=near)
     assert isinstance(team, ShieldedCallable)
     assert team(60.0).values.tobytes() == wanted.values.tobytes()
     assert team(6.0).values[0, 1] != 0.0

@@ -63,7 +63,7 @@ class Policy:
         for _ in range(steps):
             observations, *_, infos = self.env.step(self.team.act(*self.seen))
             self.seen = observations, infos
-        return digest(self.env.core.state, self.team.decisions.reason, self.team.decisions.certificate_m)
+        return digest(self.env.core.state, self.team.decisions.reason, self.team.decisions.safety_margin_m)
 
 
 class Batch:
@@ -84,7 +84,7 @@ class Batch:
 
     def play(self, steps=25):
         seen = [self.front.step((7 * np.arange(self.batch.learners) + step) % 17)[0] for step in range(steps)]
-        return digest(self.batch.core.state, self.batch.shield.reason, self.batch.shield.certificate_m, *seen)
+        return digest(self.batch.core.state, self.batch.shield.reason, self.batch.shield.safety_margin_m, *seen)
 
 
 def sb3_front(batch):

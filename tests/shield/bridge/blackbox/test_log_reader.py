@@ -42,7 +42,7 @@ def test_a_whole_log(log):
     with LogReader(folder / "run.mcap") as reader:
         for tick, back in zip(ticks, reader.ticks(), strict=True):
             assert back.fleet.state.tobytes() == tick.fleet.state.tobytes()
-            assert back.decisions.sent.values.tobytes() == tick.decisions.sent.values.tobytes()
+            assert back.decisions.filtered.values.tobytes() == tick.decisions.filtered.values.tobytes()
             assert np.array_equal(back.decisions.bound, tick.decisions.bound)
             assert back.readings == tick.readings or "nan" in repr(tick.readings)
             assert back.actions == tick.actions

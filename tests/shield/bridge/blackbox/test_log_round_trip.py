@@ -77,11 +77,11 @@ def decided(draw, fleet, wanted):
     sent = wanted if draw(st.booleans()) else Commands(draw(arrays(n, 2)), draw(st.booleans()))
     return Decisions(
         fleet=fleet,
-        wanted=wanted,
-        sent=sent,
+        nominal=wanted,
+        filtered=sent,
         intervened=np.array(draw(st.lists(st.booleans(), min_size=n, max_size=n)), dtype=np.bool_),
         reason=np.array(draw(st.lists(st.integers(0, 6), min_size=n, max_size=n)), dtype=np.int64),
-        certificate_m=draw(arrays(n)),
+        safety_margin_m=draw(arrays(n)),
         slack_m=draw(arrays(n)),
         bound=np.array(draw(st.lists(st.integers(-2, n - 1), min_size=n, max_size=n)), dtype=np.int64),
         solve_time_s=draw(floats),
@@ -187,7 +187,7 @@ def test_a_tick_with_anything_in_it_reads_or_is_refused(data):
 
 
 def test_a_header_comes_back():
-    config = ShieldConfig(response_per_s=math.inf, edge_m=None, max_track_age_s=math.inf, delay_s=0.1 + 0.2)
+    config = ShieldConfig(cbf_rate_per_s=math.inf, edge_m=None, max_track_age_s=math.inf, delay_s=0.1 + 0.2)
     header = header_of(config, notes={"accepted": "rates:blue_1"})
     back = LogHeader.from_message(json.loads(json.dumps(header.to_message(), allow_nan=False)))
     assert back == header

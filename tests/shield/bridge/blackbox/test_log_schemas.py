@@ -28,7 +28,7 @@ def odd_tick(number, tick):
     decisions = dataclasses.replace(
         tick.decisions,
         fleet=fleet,
-        certificate_m=np.array([math.inf, -math.inf, math.nan, 1.0]),
+        safety_margin_m=np.array([math.inf, -math.inf, math.nan, 1.0]),
         solve_time_s=math.nan,
     )
     wanted = dataclasses.replace(tick.wanted, values=np.full((4, 2), math.nan))
@@ -36,7 +36,7 @@ def odd_tick(number, tick):
                                   position_m=(math.nan, 1.0))  # fmt: skip
     sent = dataclasses.replace(tick.sent["blue_1"], heading_rad=math.nan, speed_mps=math.nan, delivered=False)
     odd = dataclasses.replace(
-        tick, fleet=fleet, wanted=wanted, decisions=dataclasses.replace(decisions, wanted=wanted),
+        tick, fleet=fleet, wanted=wanted, decisions=dataclasses.replace(decisions, nominal=wanted),
         readings={"blue_1": reading}, sent={"blue_1": sent}, policy_age_s=math.inf,
     )  # fmt: skip
     bare = dataclasses.replace(tick, fleet=None, wanted=None, decisions=None, readings={}, contacts=(), sent={})
@@ -89,8 +89,8 @@ def test_a_gap_is_left_for_viewers_and_a_zero_in_a_list():
     tick = odd_tick(0, next(iter(Encounter(header_of(), 1))))
     message = tick_to_json(tick, HERON)
     first, second = message["boats"][:2]
-    assert "certificate_m" not in first
-    assert "certificate_m" not in second
+    assert "safety_margin_m" not in first
+    assert "safety_margin_m" not in second
     assert message["boats"][2]["state"][4:] == [0.0] * 7
     assert first["wanted"] == []
     assert message["readings"][0]["position_m"] == [0.0, 1.0]

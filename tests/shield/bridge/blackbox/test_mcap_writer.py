@@ -179,13 +179,13 @@ def test_arrays_may_be_used_again_after_take(tmp_path):
     writer.take(tick)
     tick.fleet.state[:] = 7.0
     tick.wanted.values[:] = 7.0
-    tick.decisions.certificate_m[:] = 7.0
+    tick.decisions.safety_margin_m[:] = 7.0
     writer.close()
     with LogReader(tmp_path / "run.mcap") as log:
         back = next(log.ticks())
     assert back.fleet.state.tobytes() == kept.tobytes()
     assert not (back.wanted.values == 7.0).any()
-    assert not (back.decisions.certificate_m == 7.0).any()
+    assert not (back.decisions.safety_margin_m == 7.0).any()
 
 
 def test_a_log_is_never_written_over(tmp_path):

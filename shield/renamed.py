@@ -1,0 +1,111 @@
+"""Public names of 0.8: each still works for one release, and warns with the name that took its place."""
+
+from __future__ import annotations
+
+import functools
+import logging
+import warnings
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
+
+SETTINGS = {
+    "adversary_s": "adversary_horizon_s",
+    "visitor_s": "intruder_horizon_s",
+    "certificate": "opponent_model",
+    "response_per_s": "cbf_rate_per_s",
+    "table_response_per_s": "table_cbf_rate_per_s",
+    "fixed_response_per_s": "static_cbf_rate_per_s",
+    "give_way_after_s": "deadlock_timeout_s",
+    "search_limit": "work_budget",
+    "dwell_s": "min_backup_hold_s",
+    "tail_s": "straight_horizon_s",
+    "hull_m": "obstacle_clearance_m",
+    "mate_cap_m": "teammate_margin_cap_m",
+}
+"""Settings of `ShieldConfig`, old name to new."""
+SETTING_PROPERTIES = {
+    "feared_s": "effective_adversary_horizon_s",
+    "visitor_feared_s": "effective_intruder_horizon_s",
+}
+PROFILES = {"players": "competitive", "rammers": "ramming", "hold-course": "constant_velocity"}
+DECISION = {
+    "wanted_heading_rad": "nominal_heading_rad",
+    "wanted_speed_mps": "nominal_speed_mps",
+    "sent_heading_rad": "filtered_heading_rad",
+    "sent_speed_mps": "filtered_speed_mps",
+    "binding": "active_constraints",
+    "certificate_m": "safety_margin_m",
+    "feared_s": "adversary_horizon_s",
+}
+"""Fields of `Decision`."""
+DECISIONS = {
+    "wanted": "nominal",
+    "sent": "filtered",
+    "certificate_m": "safety_margin_m",
+    "feared_s": "adversary_horizon_s",
+}
+"""Fields of `Decisions`."""
+FLEET = {"adversary_s": "adversary_horizon_s"}
+"""Fields of `Fleet`."""
+
+T = TypeVar("T", bound=type)
+LOG = logging.getLogger(__name__)
+
+
+def current_settings(settings: Mapping[str, Any], warned: bool = False) -> dict[str, Any]:
+    """Settings of the shield as an earlier version wrote them, under the names of this one; others stay as they are.
+
+    Args:
+        settings: by name.
+        warned: whether whoever wrote an old name is there to be told.
+    """
+    renamed = {}
+    for name, value in settings.items():
+        new = SETTINGS.get(name, name)
+        known = PROFILES.get(value, value) if new == "profile" and isinstance(value, str) else value
+        for old, now in ((name, new), (value, known)):
+            if warned and now is not old and now != old:
+                LOG.warning("%s is now %s; the old name goes with the next release", old, now)
+        renamed[new] = known
+    return renamed
+
+
+def warn(old: str, new: str, stacklevel: int = 3) -> None:
+    """Say that a name goes, and what took its place."""
+    text = f"{old!r} is now {new!r}; the old name goes with the next release"
+    warnings.warn(text, DeprecationWarning, stacklevel=stacklevel + 1)
+
+
+def accepts_old_names(keywords: Mapping[str, str], attributes: Mapping[str, str] | None = None) -> Callable[[T], T]:
+    """Let a class be built with, and read by, its old names as well; each use warns.
+
+    Args:
+        keywords: keywords of its constructor, and of its classmethod ``of`` where it has one, old name to new.
+        attributes: what else can be read by an old name.
+    """
+    readable = {**keywords, **(attributes or {})}
+
+    def decorate(cls: T) -> T:
+        def renaming(build: Callable[..., Any]) -> Callable[..., Any]:
+            @functools.wraps(build)
+            def called(*args: Any, **given: Any) -> Any:
+                for old in [name for name in given if name in keywords]:
+                    warn(old, keywords[old])
+                    given[keywords[old]] = given.pop(old)
+                return build(*args, **given)
+
+            return called
+
+        def __getattr__(self: Any, name: str) -> Any:
+            if name not in readable:
+                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+            warn(name, readable[name])
+            return getattr(self, readable[name])
+
+        cls.__init__ = renaming(cls.__init__)  # type: ignore[misc]
+        if "of" in vars(cls):
+            cls.of = classmethod(renaming(vars(cls)["of"].__func__))  # type: ignore[attr-defined]
+        cls.__getattr__ = __getattr__  # type: ignore[attr-defined]
+        return cls
+
+    return decorate
