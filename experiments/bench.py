@@ -71,8 +71,8 @@ class BenchSettings:
     def small(self) -> BenchSettings:
         """Return a version of seconds instead of minutes; its figures are rough."""
         batch = BatchSize(games=64, steps=20, repeats=2)
-        fewer = {"repeats": 1, "game_s": 20.0, "lookups": 20_000, "programs": 30, "scenes": 10}
-        return replace(self, batch=batch, counts=self.counts[:2], **fewer)
+        fewer = replace(self, repeats=1, game_s=20.0, lookups=20_000, programs=30, scenes=10)
+        return replace(fewer, batch=batch, counts=self.counts[:2])
 
 
 def run_bench(settings: BenchSettings, notice: Callable[[str], None] = lambda words: None) -> dict[str, Any]:

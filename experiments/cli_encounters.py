@@ -231,8 +231,8 @@ def attack(
     if len(pairs) != 1:
         raise ConfigError(f"attack takes one --platform, own or own/attackers', not {len(pairs)}")
     check_count("--restarts", what.restarts, 1, MOST_PLAYED)
-    boats, sizes = (what.attackers, what.own, guards[0]), (what.population, what.generations)
-    first = Search(*pairs[0], *boats, scenes.given(), what.seed, 0, *sizes)
+    given, sizes = scenes.given(), (what.population, what.generations)
+    first = Search(*pairs[0], what.attackers, what.own, guards[0], given, what.seed, 0, *sizes)
     first.duel()
     workers, folder = where.workers(), where.folder_of("attack")
     with progress("searches", what.restarts) as notice:

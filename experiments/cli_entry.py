@@ -21,6 +21,7 @@ from .entries.report_page import EntryGames, games_to_look_at, shielded_zip, wri
 from .entries.team import is_entry
 from .entries.wrap import wrap_entry
 from .play.match import play_match
+from .play.spec import ANSWER_S
 from .policy_checks import say_of_elsewhere
 from .provenance import machine, versions
 from .replay_html import write_replay
@@ -52,7 +53,7 @@ def check(
     entry: Entry,
     preset: o.Preset = "mctf2026",
     max_time: Annotated[float | None, o.option("S", "Length of the game it is tried in, s. [whole]")] = None,
-    answer_time: o.AnswerTime = o.ANSWER_S,
+    answer_time: o.AnswerTime = ANSWER_S,
     json_file: o.JsonFile = None,
 ) -> None:
     """Check an entry: whether it loads, what it imports, how long its actions take, a game against boats that hold.
@@ -122,7 +123,7 @@ def report(
     where: o.RunOptions,
     also: Annotated[str | None, o.option("A.zip,B.zip", "Further opponents: entries or policies.")] = None,
     looks: Annotated[int, o.option("N", "Pairs of games to keep as replays, 0 to 3.")] = 2,
-    answer_time: o.AnswerTime = o.ANSWER_S,
+    answer_time: o.AnswerTime = ANSWER_S,
 ) -> None:
     """Play an entry bare, as the zip that `entry wrap` writes, and with the shield round the game; write entry.html.
 

@@ -188,7 +188,7 @@ def demonstrate(
         raise ConfigError(f"Parquet files need pyarrow; {install_command('parquet')}")
     warn(CHOOSING)
     rules = o.RuleOptions(preset, max_time).given()
-    shielded = {} if shield else None
+    shielded: dict[str, Any] | None = {} if shield else None
     spec = MatchSpec(preset, "options", opponent, 0, seed, side, shielded, rules=rules, judge="none")
     rows, row = demonstration(spec, Demonstrator(say=warn), speed)
     out().print(game_table(row, spec.radii_m))

@@ -14,6 +14,7 @@ import typer
 from steerclear.env.config import GameConfig
 from steerclear.shield.config import PROFILES, ShieldConfig
 from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.renamed import current_settings
 
 from .game_metrics import DEFAULT_PENALTY
 from .metrics import RADII_M
@@ -75,8 +76,8 @@ class KeptOptions:
             ConfigError: one is given twice, or the separation, at which hits are counted as well, is no distance.
         """
         named = {"separation_m": self.separation, "profile": self.profile}
-        more = {name: getattr(self, name, None) for name in ("certificate", "solver")}
-        given = _together({**named, **more}, self.shield_set, "--shield-set")
+        more = {name: getattr(self, name, None) for name in ("opponent_model", "solver")}
+        given = current_settings(_together({**named, **more}, self.shield_set, "--shield-set"), warned=True)
         ShieldConfig.of(**{name: value for name, value in given.items() if name == "separation_m"})
         return given
 
@@ -93,7 +94,9 @@ class KeptOptions:
 class ShieldOptions(KeptOptions):
     """Settings of a shield."""
 
-    certificate: Annotated[str | None, option("NAME", "Certificate of the shield.")] = None
+    opponent_model: Annotated[
+        str | None, option("NAME", "How the shield predicts opponents.", "--opponent-model", "--certificate")
+    ] = None
     solver: Annotated[str | None, option("NAME", "QP solver of the shield.")] = None
 
 

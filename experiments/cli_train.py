@@ -12,10 +12,9 @@ from typing import Annotated, Any
 
 import typer
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-from steerclear.policies.entrants.learned import read_weights
 from steerclear.policies.entrants.learned.network import Network
 from steerclear.policies.entrants.learned.sb3_file import read_sb3
-from steerclear.policies.entrants.learned.weights_file import write_weights
+from steerclear.policies.entrants.learned.weights_file import read_weights, write_weights
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.extras import install_command
 

@@ -12,6 +12,7 @@ from typing import Any
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.foreign import visible
+from steerclear.shield.renamed import current_settings
 
 from . import plots
 from .bench import bench_tables
@@ -254,7 +255,7 @@ def _horizon_of(content: Mapping[str, Any]) -> tuple[float, float] | None:
         return None
     told = {
         k: math.inf if v == "inf" else v
-        for k, v in shield.items()
+        for k, v in current_settings(shield).items()
         if k in ("adversary_horizon_s", "intruder_horizon_s", "profile")
     }
     config = ShieldConfig.of(**told)

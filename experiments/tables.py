@@ -113,7 +113,7 @@ def titled(
 
 def goals_table(goals: Sequence[Mapping[str, Any]]) -> Group:
     """Build the table of goals: what is asked, what was measured, whether it is met."""
-    rows = [[*goal_cells(goal), _VERDICTS[goal["met"]]] for goal in goals]
+    rows: list[list[str | Text]] = [[*goal_cells(goal), _VERDICTS[goal["met"]]] for goal in goals]
     return titled("Goals", ["", "measured", "goal", ""], rows, wrap=True)
 
 

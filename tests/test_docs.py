@@ -94,6 +94,28 @@ def test_a_page_has_a_next_step(page):
     assert re.search(r"^(Next: |## (\d+\. )?On from here)", text, flags=re.MULTILINE), page.name
 
 
+RETIRED = {
+    r"\bfear(s|ed)?\b": "adversary",
+    r"\bwanted commands?\b": "nominal command",
+    r"\bforeseen?\b": "predicted",
+    r"\bbinding\b": "active constraint",
+    r"(?<!barrier )certificates?\b": "safety margin, or opponent model",
+    r"\bworth\b": "score",
+    r"\bslopes?\b": "gradient",
+    r"\boracle\b": "post-hoc avoidability analysis",
+    r"\bteam-mates?\b": "teammate",
+    r"\bvisitors?\b": "intruder",
+}
+"""Words of earlier versions, and what the glossary has in their place."""
+
+
+@pytest.mark.parametrize("page", [ROOT / "README.md", *sorted(DOCS.glob("*.md"))], ids=lambda page: page.name)
+def test_retired_words_stay_out(page):
+    text = text_of(page).replace("barrier certificates", "")
+    found = {word: instead for word, instead in RETIRED.items() if re.search(word, text, flags=re.IGNORECASE)}
+    assert not found, f"{page.name}: say instead {found}"
+
+
 def test_the_site_builds_without_a_warning(tmp_path):
     pytest.importorskip("mkdocstrings_handlers.python", reason="extra [docs]")
     for name in ("docs", "mkdocs.yml"):

@@ -3,8 +3,6 @@
 import re
 from pathlib import Path
 
-import pytest
-
 README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
 
@@ -22,7 +20,7 @@ def printed(block, capsys):
 
 
 def test_there_are_as_many_blocks_as_are_run_here():
-    assert len(BLOCKS) == 3
+    assert len(BLOCKS) == 2
 
 
 def test_fifteen_lines_print_what_is_said(capsys):
@@ -33,9 +31,3 @@ def test_fifteen_lines_print_what_is_said(capsys):
 def test_a_wrapped_game_steps_and_tells_its_reason(capsys):
     said = re.search(r"\.reason\.name\)  # (\w+);", BLOCKS[1]).group(1)
     assert printed(BLOCKS[1], capsys) == said
-
-
-@pytest.mark.filterwarnings("default")
-def test_as_many_learners_begin_as_is_said():
-    said = int(re.search(r"# (\d+) boats", BLOCKS[2]).group(1))
-    assert len(run(BLOCKS[2])["observations"]) == said

@@ -13,8 +13,8 @@ fleet = Fleet.of(
     platforms="heron",
     names=["ours", "theirs"],
 )
-wanted = Commands.absolute_rad([[2.0, 0.0], [2.0, math.pi]])  # speed, heading: straight on
-d = shield.decide(fleet, wanted)[0]
+nominal = Commands.absolute_rad([[2.0, 0.0], [2.0, math.pi]])  # speed, heading: straight on
+d = shield.decide(fleet, nominal)[0]
 print(
     d.reason.name,
     f"{math.degrees(d.filtered_heading_rad):.1f} deg",

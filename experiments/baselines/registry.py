@@ -32,8 +32,15 @@ GIVEN = {
 class Guard(Protocol):
     """What filters the commands of a batch of games; the batched shield is one."""
 
-    reason: IntArray
-    safety_margin_m: Array
+    @property
+    def reason(self) -> IntArray:
+        """(B, n) values of `Reason`, of the last decision."""
+        ...
+
+    @property
+    def safety_margin_m(self) -> Array:
+        """(B, n) margin left, m, of the last decision; inf where nobody is near."""
+        ...
 
     def decide(self, state: Array, wanted: Array, ours: BoolArray) -> Array:
         """Commands (B, n, 2), speed m/s and relative heading deg, for the boats of ``ours`` (B, n)."""

@@ -13,6 +13,7 @@ from typing import Any
 from zlib import crc32
 
 import numpy as np
+from numpy.typing import NDArray
 from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
 from steerclear.env.mctf import MctfEnv
@@ -118,7 +119,9 @@ def uniform(seeds: Array, b: int) -> float:
 
 
 @kernel
-def observe(state: Array, error: Array, seeds: Array, bound_m: float, first: bool, dt_s: float, seen: Array) -> None:
+def observe(
+    state: Array, error: Array, seeds: NDArray[Any], bound_m: float, first: bool, dt_s: float, seen: Array
+) -> None:
     """States as the own team knows them: positions off by a slowly changing error within ``bound_m``.
 
     The error is a Gauss-Markov process, half the bound per axis, drawn back onto the circle where it leaves it.

@@ -91,10 +91,10 @@ def _against(cells: Cells) -> list[str]:
         games = [_games(cells[key]) for key in (("none", collision), ("deployment", collision)) if key in cells]
         if len(games) == 2 and len(games[0]) == len(games[1]) > 1:
             pairs = games[0].add_suffix("_a").join(games[1].add_suffix("_b"))
-            net, hits = (_text(difference(pairs, metric)[0], "+") for metric in (NET, HITS))
+            less_net, less_hits = (_text(difference(pairs, metric)[0], "+") for metric in (NET, HITS))
             lines += [
                 f"Shield at deployment less none, same networks and starts, game by game, collision term {collision}: "
-                f"net captures {net}, hits {hits} a game.",
+                f"net captures {less_net}, hits {less_hits} a game.",
                 "",
             ]
     changes = []

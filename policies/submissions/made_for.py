@@ -14,6 +14,7 @@ from steerclear.env.config import GameConfig
 from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.foreign import plain_text
 from steerclear.shield.platforms import get_platform
+from steerclear.shield.renamed import current_settings
 
 from ..games import SeenGame
 
@@ -61,7 +62,7 @@ def made_for(source: str | Path) -> MadeFor | None:
         separation_m = math.nan if told["separation_m"] is None else float(told["separation_m"])
         platforms = tuple(plain_text(name, 40) for name in told["platforms"])
         preset, decision_s = plain_text(told["preset"], 40), float(told["decision_s"])
-        return MadeFor(preset, decision_s, platforms, separation_m, dict(told["shield"]))
+        return MadeFor(preset, decision_s, platforms, separation_m, current_settings(told["shield"]))
     except (OSError, ValueError, KeyError, TypeError, RuntimeError, EOFError, zipfile.BadZipFile, zlib.error):
         return None
 

@@ -11,6 +11,7 @@ from typing import Any
 from ..config import ShieldConfig
 from ..exceptions import ConfigError, FleetFileError
 from ..platforms import Gains, Platform, get_platform
+from ..renamed import current_settings
 from ..surroundings import Surroundings
 from .fleet_settings import BoatSettings, FleetSettings, MoosLinkSettings
 
@@ -71,7 +72,7 @@ def shield_config(fleet: FleetSettings) -> ShieldConfig:
     Raises:
         FleetFileError: a setting is unknown or contradicts the file's own key.
     """
-    settings = dict(fleet.shield)
+    settings = current_settings(fleet.shield, warned=True)
     dt_s = 1.0 / fleet.rate_hz
     for key, value, source in (("dt_s", dt_s, "rate_hz"), ("coordination", fleet.coordination, "coordination")):
         given = settings.setdefault(key, value)

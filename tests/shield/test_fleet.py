@@ -182,17 +182,7 @@ def test_rows_may_be_given_as_lists():
 def test_decisions_print_as_a_table():
     lines = str(Shield().decide(fleet(), AHEAD)).splitlines()
     assert lines[0].split() == [
-        "boat",
-        "wanted",
-        "deg",
-        "m/s",
-        "sent",
-        "deg",
-        "m/s",
-        "reason",
-        "binding",
-        "margin",
-        "m",
+        *("boat", "nominal", "deg", "m/s", "filtered", "deg", "m/s", "reason", "active", "constraint", "margin", "m"),
     ]
     assert lines[1].startswith("boat_0 ")
     assert "NOT_COVERED" in lines[2]
@@ -235,7 +225,7 @@ def test_decisions_can_be_indexed_by_name():
         (True, "not by True"),
         (np.False_, "not by np.False_"),
         (None, "not by None"),
-        ([0, 1], r"not by \[0, 1\]; of several boats at once see their arrays: sent.values"),
+        ([0, 1], r"not by \[0, 1\]; of several boats at once see their arrays: filtered.values"),
         (np.array([True, False]), "of several boats at once"),
         ((0, 1), "of several boats at once"),
         (b"boat_0", "not by b'boat_0'"),

@@ -12,7 +12,7 @@ from steerclear.shield.backup.family import CERTIFICATES
 from steerclear.shield.config import COORDINATION, PROFILES, RANGES
 from steerclear.shield.exceptions import ConfigError, SolverError, SteerclearError
 
-TEXTS = ("beyond_then", "certificate", "coordination", "profile", "solver")
+TEXTS = ("beyond_then", "opponent_model", "coordination", "profile", "solver")
 NUMBERS = [entry.name for entry in fields(ShieldConfig) if entry.name not in (*TEXTS, "barriers")]
 NOT_ZERO = [
     "move_s",
@@ -86,7 +86,9 @@ def test_profiles_are_names_of_the_time_opponents_are_feared_for():
         for name, config in told.items()
     } == PROFILES
     assert ShieldConfig(profile="ramming", adversary_horizon_s=5.0).effective_adversary_horizon_s == 5.0
-    with pytest.raises(ConfigError, match="unknown profile 'players!'; choose one of players, rammers, hold-course"):
+    with pytest.raises(
+        ConfigError, match="unknown profile 'competitive!'; choose one of competitive, ramming, constant_velocity"
+    ):
         ShieldConfig(profile="competitive!")
 
 
@@ -97,7 +99,7 @@ def test_names_must_be_texts(name, value):
         ShieldConfig(**{name: value})
 
 
-@pytest.mark.parametrize(("name", "known"), [("certificate", CERTIFICATES), ("coordination", COORDINATION)])
+@pytest.mark.parametrize(("name", "known"), [("opponent_model", CERTIFICATES), ("coordination", COORDINATION)])
 def test_unknown_names_are_told_the_known_ones(name, known):
     with pytest.raises(ConfigError, match=rf"unknown {name} 'magic'.*{'.*'.join(known)}"):
         ShieldConfig(**{name: "magic"})
@@ -158,10 +160,14 @@ def test_all_errors_are_of_one_tree():
 
 
 @settings(max_examples=60, deadline=None, derandomize=True)
-@given(separation=st.floats(0.01, 50.0), fear=st.floats(0.0, 200.0), opponent_model=st.sampled_from(list(CERTIFICATES)))
-def test_sensible_settings_are_taken_as_given(separation, fear, certificate):
-    config = ShieldConfig.of(separation_m=separation, adversary_horizon_s=fear, opponent_model=certificate)
-    assert (config.separation_m, config.adversary_horizon_s, config.opponent_model) == (separation, fear, certificate)
+@given(st.floats(0.01, 50.0), st.floats(0.0, 200.0), st.sampled_from(list(CERTIFICATES)))
+def test_sensible_settings_are_taken_as_given(separation, fear, opponent_model):
+    config = ShieldConfig.of(separation_m=separation, adversary_horizon_s=fear, opponent_model=opponent_model)
+    assert (config.separation_m, config.adversary_horizon_s, config.opponent_model) == (
+        separation,
+        fear,
+        opponent_model,
+    )
     assert Shield(config).config is config
 
 

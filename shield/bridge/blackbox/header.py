@@ -16,6 +16,7 @@ from typing import Any
 from ...config import ShieldConfig
 from ...exceptions import LogError, SteerclearError
 from ...platforms import Platform, get_platform
+from ...renamed import current_settings
 from ...surroundings import OPEN_WATER, Surroundings
 from ...tables.files import find_table
 from ...tables.settings import OtherMay
@@ -232,7 +233,7 @@ def _parts(message: Mapping[str, Any]) -> dict[str, Any]:
     size = json.loads(message["field_size_m"])
     frame = json.loads(message["frame"])
     return {
-        "config": ShieldConfig.of(**restored(json.loads(message["shield"]))),
+        "config": ShieldConfig.of(**current_settings(restored(json.loads(message["shield"])))),
         "surroundings": Surroundings(**restored(json.loads(message["surroundings"]))),
         "platforms": {name: platform_from(row) for name, row in json.loads(message["platforms"]).items()},
         "boats": tuple(_boat(row) for row in json.loads(message["boats"])),
