@@ -210,8 +210,8 @@ def compare_pair(
 ) -> SetPair:
     """Areas of both sets, up to the table's range, for one relative heading and pair of speeds."""
     radius_m = config.separation_m + config.buffer_m + 2.0 * config.position_error_m
-    edges = np.asarray(np.linspace(radius_m, values.card.make_grid().rho_last_m, RANGES + 1), dtype=np.float64)
-    bearings = np.arange(BEARINGS) * (2.0 * math.pi / BEARINGS)
+    edges = np.linspace(radius_m, values.card.make_grid().rho_last_m, RANGES + 1)
+    bearings = np.asarray(np.arange(BEARINGS) * (2.0 * math.pi / BEARINGS), dtype=np.float64)
     state, cells = _all_round(values, (heading_deg, own_mps, other_mps), edges, bearings)
     ours = certificates_m(state, (values.card.own, values.card.other), config) < 0.0
     theirs = values_m(values, state) < radius_m
@@ -251,8 +251,8 @@ def play_job(job: Job) -> list[Row]:
     values, radius_m = load_table(job["own"], job["other"], "worst-case"), job["radius_m"]
     heading_deg, own_mps, other_mps = place = tuple(job["place"])
     config = _config(radius_m, job["shield"], NOT_PLAYED)
-    edges = np.asarray(np.linspace(radius_m, values.card.make_grid().rho_last_m, PLAYED_RANGES + 1), dtype=np.float64)
-    bearings = (np.arange(PLAYED_BEARINGS) + 0.5) * (2.0 * math.pi / PLAYED_BEARINGS)
+    edges = np.linspace(radius_m, values.card.make_grid().rho_last_m, PLAYED_RANGES + 1)
+    bearings = np.asarray((np.arange(PLAYED_BEARINGS) + 0.5) * (2.0 * math.pi / PLAYED_BEARINGS), dtype=np.float64)
     state, cells_m2 = _all_round(values, place, edges, bearings)
     value_m = values_m(values, state)
     reach, band = value_m < radius_m, value_m < radius_m + BAND_M
