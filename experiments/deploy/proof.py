@@ -119,8 +119,10 @@ def _stops(sent: Sent) -> bool:
 
 
 def _declares_stop(tick: Tick, name: str) -> bool:
-    stopped = tick.decisions is not None and any(
-        (decision.boat, decision.reason) == (name, Reason.STOPPED) for decision in tick.decisions
+    decisions = tick.decisions  # numbers are compared: those of a damaged log need be no reason's
+    stopped = decisions is not None and any(
+        boat == name and reason == Reason.STOPPED
+        for boat, reason in zip(decisions.fleet.names, decisions.reason.tolist(), strict=False)
     )
     return stopped or any((action.subject, action.condition) == (name, OWN_STOP) for action in tick.actions)
 
