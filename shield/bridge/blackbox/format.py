@@ -266,6 +266,8 @@ def _tick(record: TickRecord, platforms: Mapping[str, Platform]) -> Tick:
         if any(column is None for column in (*floats, *whole)) and rows:
             raise LogError("a decision lacks a value; it is damaged or of another version")
         safety_margin_m, slack_m, reason, bound = (np.array([]) if c is None else c for c in (*floats, *whole))
+        if not set(reason.tolist()) <= {int(known) for known in Reason}:
+            raise LogError("a decision has a reason that is none; it is damaged or of another version")
         decisions = Decisions(
             fleet=fleet,
             nominal=wanted,
