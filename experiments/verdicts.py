@@ -98,7 +98,7 @@ def judge_game(
         motion: the current that carried the boats, and how late their commands came.
 
     Returns:
-        Per breach, in order of time, the entries that `keys.BREACH` describes.
+        Per breach, in order of time, the entries that `docs_keys.BREACH` describes.
     """
     meta = read_meta(record)
     team = np.asarray(meta["team"])
@@ -194,7 +194,7 @@ def verdict_columns(breaches: Sequence[Row] | None, radius_m: float) -> dict[str
     """Count a game's verdicts per kind of pair.
 
     Args:
-        breaches: as `judging.judge_game` returns them; None when the game was not judged.
+        breaches: as `judge_game` returns them; None when the game was not judged.
         radius_m: at which they were.
 
     Returns:

@@ -38,10 +38,10 @@ class ShieldConfig:
         dt_s: step of the decision loop, s, and of the boat model where ``move_s`` is None.
         move_s: step of the boat model, s, where a command is held for several: ``dt_s`` is a whole number of them, in
             each of which the same relative heading is applied anew; None: a command is for one.
-        certificate: name of the certificate, see `backup.family.CERTIFICATES`.
+        opponent_model: how opponents are predicted, see `backup.family.CERTIFICATES`.
         coordination: "team" solves one program for all boats of ours, "per_boat" one for each boat, which assumes
             that teammates hold course and take their share of the answer (for boats that cannot talk).
-        solver: what solves the program: "active_set", the compiled solver, or a backend by its name in qpsolvers.
+        solver: what solves the program: "active_set" (a historical name), Hildreth's projection, compiled, or a backend by its name in qpsolvers.
         adversary_horizon_s: how long from now an opponent may do its worst, before it holds its course, s; 0: it holds
             its course from now on; inf: for ever. None takes the profile's. The longer, the more is promised, and of
             slow boats the more commands are changed. Against a boat that is slow it counts from when that is under

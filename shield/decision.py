@@ -81,7 +81,7 @@ class Decision:
         intervened: whether the two differ in any bit.
         reason: why.
         active_constraints: names of the boats, or registered barriers, or "field", that the command was chosen for.
-        safety_margin_m: verified margin beyond the separation, m; inf when nobody is near.
+        safety_margin_m: verified margin beyond the required distance, m; inf when nobody is near.
         slack_m: margin given up, m.
         fallback: name of the fallback used, or None.
         solve_time_s: time of the whole decision, s.

@@ -172,7 +172,7 @@ def _add_side(replay: Replay, side: str, title: str, states: Any) -> None:
 
 
 def _entry(row: Any, tracks: Tracks, radius_m: float) -> dict[str, Any]:
-    """A breach nobody judged, with the keys of `keys.BREACH`."""
+    """A breach nobody judged, with the keys of `docs_keys.BREACH`."""
     step, pair = int(row[0]), (int(row[1]), int(row[2]))
     both = bool(tracks.ours[list(pair)].all())
     return {
@@ -207,7 +207,7 @@ def _distances(record: Record, tracks: Tracks, states: Any) -> dict[str, Any]:
 
 
 def as_content(replay: Replay) -> dict[str, Any]:
-    """The report as JSON-ready content, see `replay_keys.REPLAY`."""
+    """The report as JSON-ready content, see `keys.REPLAY`."""
     proof = replay.proof
     content: dict[str, Any] = {
         "began": replay.began,

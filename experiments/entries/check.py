@@ -44,7 +44,7 @@ def check_entry(path: str, preset: str, max_time_s: float | None, answer_s: floa
         answer_s: time it has for the actions of a decision, s.
 
     Returns:
-        What `keys.ENTRY_CHECK` describes.
+        What `docs_keys.ENTRY_CHECK` describes.
 
     Raises:
         PolicyError: it cannot be loaded, or gave nothing usable throughout the game; the message says why.

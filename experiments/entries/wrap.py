@@ -43,7 +43,7 @@ def wrap_entry(entry: str, out: Path, preset: str, shield: dict[str, Any]) -> di
         shield: settings of the shield that are not the default.
 
     Returns:
-        What `keys.ENTRY_WRAP` describes, and as ``tried`` what `check.check_entry` found of the entry.
+        What `docs_keys.ENTRY_WRAP` describes, and as ``tried`` what `check.check_entry` found of the entry.
 
     Raises:
         PolicyError: there is no entry, it cannot be loaded, or it gave nothing usable: a shield would hide that.

@@ -42,7 +42,7 @@ class MatchSpec:
         fixed_start: start on the preset's fixed places instead of random ones.
         penalty: weight of a collision in the primary score.
         radii_m: radii at which breaches are counted.
-        judge: whose breaches the oracle judges, see `judging.JUDGE`.
+        judge: whose breaches the oracle judges, see `verdicts.JUDGE`.
         conditions: delay, position noise and current, the same with a shield and without.
         files: digests of both policies' files (`policies.fingerprint`), own and opponent; empty where there are none.
         trust: also load models that lie among entries of others, see `policies.load_sb3`.

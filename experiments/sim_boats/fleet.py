@@ -304,7 +304,7 @@ class SimFleet:
             return record_of(self._world.truth).record()
 
     def judge(self, team: int = 0) -> list[dict[str, Any]]:
-        """Breaches of a team since the game began, with the oracle's verdicts (`experiments.pages.keys.BREACH`).
+        """Breaches of a team since the game began, with the oracle's verdicts (`docs_keys.BREACH`).
 
         Raises:
             ConfigError: nothing was recorded.

@@ -189,9 +189,9 @@ class TruthRecord:
         return {**record, "state": self._log.states, "commanded": self._marks.commanded(record["position"].shape[1])}
 
     def judge(self, team: int = 0) -> list[dict[str, Any]]:
-        """What the oracle says of the breaches that a team's boats were in, see `experiments.pages.keys.BREACH`.
+        """What the oracle says of the breaches that a team's boats were in, see `docs_keys.BREACH`.
 
-        With what held the boats then, see `marks.Marks.of`.
+        With what held the boats then, see `Marks.of`.
         """
         ids = list(self._game.core.config.agent_ids)
         found = judge_game(self._log, self._game.core.params, self.record(), team)
