@@ -41,7 +41,8 @@ class ShieldConfig:
         opponent_model: how opponents are predicted, see `backup.family.CERTIFICATES`.
         coordination: "team" solves one program for all boats of ours, "per_boat" one for each boat, which assumes
             that teammates hold course and take their share of the answer (for boats that cannot talk).
-        solver: what solves the program: "active_set" (a historical name), Hildreth's projection, compiled, or a backend by its name in qpsolvers.
+        solver: what solves the program: "active_set" (a historical name), Hildreth's projection, compiled, or a backend
+            by its name in qpsolvers.
         adversary_horizon_s: how long from now an opponent may do its worst, before it holds its course, s; 0: it holds
             its course from now on; inf: for ever. None takes the profile's. The longer, the more is promised, and of
             slow boats the more commands are changed. Against a boat that is slow it counts from when that is under
