@@ -128,9 +128,9 @@ class BatchedShield:
         Raises:
             FleetError: an array has the wrong shape or holds no numbers, or a state is not finite.
         """
+        wanted = _shaped("wanted", wanted, (*self.reason.shape, 2), numbers)
         self._give(state, ours, visiting, driven)
-        given = self._deciders.scene.given
-        given[:, :, W.NOMINAL_SPEED : W.NOMINAL_TURN + 1] = _shaped("wanted", wanted, (*self.reason.shape, 2), numbers)
+        self._deciders.scene.given[:, :, W.NOMINAL_SPEED : W.NOMINAL_TURN + 1] = wanted
         self._barriers.renew()
         self._deciders.decide(self._static)
         self._barriers.tell()
@@ -143,12 +143,12 @@ class BatchedShield:
             FleetError: see `decide`.
         """
         games, given = self.reason.shape, self._deciders.scene.given
-        state = _shaped("state", state, (*games, L.N_STATE), numbers)
+        state, ours = _shaped("state", state, (*games, L.N_STATE), numbers), _shaped("ours", ours, games, truths)
         if not (np.abs(state[:, :, : L.SPEED_ERROR]) <= LARGEST).all() or (np.abs(state) > LARGEST).any():
             raise FleetError(f"a boat's position, heading, speed, thrust or rudder is not finite or beyond {LARGEST:g}")
         if (np.abs(state[:, :, L.SPEED]) > LARGEST_SPEED_MPS).any():
             raise FleetError(f"a boat's speed is beyond {LARGEST_SPEED_MPS:g} m/s; no boat of a game goes so fast")
-        given[:, :, : L.N_STATE], given[:, :, W.OURS] = state, _shaped("ours", ours, games, truths)
+        given[:, :, : L.N_STATE], given[:, :, W.OURS] = state, ours
         given[:, :, W.VISITING] = False if visiting is None else _shaped("visiting", visiting, games, truths)
         given[:, :, W.DRIVEN :] = np.nan if driven is None else _shaped("driven", driven, (*games, 4), numbers)
         given[:, :, W.HORIZON_S] = np.nan

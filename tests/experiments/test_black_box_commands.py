@@ -17,8 +17,8 @@ from steerclear.experiments.console import ExitCode
 from typer.testing import CliRunner
 
 ALL = """
-ablate: --address --answer-time --opponent-model --check --current --delay --engine --fixed-start --games --jobs --json
-    --judge --max-time --no-shield-autopilot --noise --opponents --out --own --penalty --platform --preset --profile
+ablate: --address --answer-time --certificate --opponent-model --check --current --delay --engine --fixed-start --games --jobs
+    --json --judge --max-time --no-shield-autopilot --noise --opponents --out --own --penalty --platform --preset --profile
     --quick --resume --seed --separation --set --shield-set --solver --trust
 attack: --address --attackers --current --delay --engine --generations --guard --jobs --json --noise --out --own
     --platform --population --radius --replay --restarts --resume --seed --workers
@@ -34,8 +34,8 @@ entry check: --answer-time --json --max-time --preset entry
 entry report: --address --also --answer-time --engine --games --jobs --json --judge --looks --max-time --opponents
     --out --platform --preset --profile --quick --resume --seed --separation --set --shield-set entry
 entry wrap: --json --out --preset --profile --separation --shield-set entry
-evaluate: --address --answer-time --opponent-model --current --delay --engine --fixed-start --games --jobs --json
-    --judge --max-time --no-shield --no-shield-autopilot --noise --opponents --out --penalty --platform --preset
+evaluate: --address --answer-time --certificate --opponent-model --current --delay --engine --fixed-start --games --jobs
+    --json --judge --max-time --no-shield --no-shield-autopilot --noise --opponents --out --penalty --platform --preset
     --profile --quick --resume --seed --separation --set --shield --shield-set --solver --trust policy
 export: --interval --out --submission model
 fit: --boat --json --kind --name --out --plot --system-id logs
@@ -43,8 +43,8 @@ parity: --jobs --json traces
 platform check: name
 platform new: --from --out name
 platform show: name
-play: --answer-time --opponent-model --current --delay --fixed-start --headless --json --keyboard --max-time
-    --no-shield --no-shield-autopilot --noise --opponent --own --penalty --platform --preset --profile --save --seed
+play: --answer-time --certificate --opponent-model --current --delay --fixed-start --headless --json --keyboard
+    --max-time --no-shield --no-shield-autopilot --noise --opponent --own --penalty --platform --preset --profile --save --seed
     --separation --set --shield --shield-set --side --solver --speed --trust --window
 preflight: --accept --boat --json --no-drill --no-tlog --speed --wait fleet
 reach check: files

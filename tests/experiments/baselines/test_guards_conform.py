@@ -115,7 +115,7 @@ def test_a_fleet_that_does_not_fit_is_refused(name):
         ("keeper", "unknown guard 'keeper'; choose from none, shield"),
         ("none:a=1", "takes no settings"),
         ("shield:tail", "has no value"),
-        ("shield:tial_s=3", "did you mean 'straight_horizon_s'"),
+        ("shield:straight_horizn_s=3", "did you mean 'straight_horizon_s'"),
         ("parabolic:a=1", "takes no settings; only shield, reach, gatekeeper"),
         ("reach:straight_horizon_s=3", "has no setting 'straight_horizon_s'"),
         ("reach:buffer_m=-1", "must be >= 0"),

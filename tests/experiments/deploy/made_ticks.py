@@ -25,8 +25,8 @@ def made_tick(fleet, now_s=5.0, names=None, **changes):
     wanted, sent = (np.array([*rows, *[(math.nan, math.nan)] * 3]) for rows in (WANTED, SENT))
     decisions = Decisions(
         fleet=state,
-        wanted=Commands.absolute_rad(_rad(wanted)),
-        sent=Commands.absolute_rad(_rad(sent)),
+        nominal=Commands.absolute_rad(_rad(wanted)),
+        filtered=Commands.absolute_rad(_rad(sent)),
         intervened=np.array([False, True, True, False, False, False]),
         reason=np.array([Reason.PASSED, Reason.LEAST_CHANGE, Reason.BEST_EFFORT, *[Reason.NOT_COVERED] * 3]),
         safety_margin_m=np.array([math.inf, 0.25, -1.5, *[math.nan] * 3]),

@@ -135,7 +135,7 @@ ALTERED = {
     ),
     "a certificate altered": (
         lambda records: changed_tick(
-            records, lambda tick: {"boats": [{**tick["boats"][0], "safety_margin_m": 9.0}, *tick["boats"][1:]]}
+            records, lambda tick: {"boats": [{**tick["boats"][0], "certificate_m": 9.0}, *tick["boats"][1:]]}
         ),
         1,
         ("1 differ", "some are not as they were written"),

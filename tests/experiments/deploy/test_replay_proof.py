@@ -112,7 +112,7 @@ def test_a_command_that_differs_in_its_last_bit_is_found(log):
     header, ticks = log
     values = ticks[60].decisions.filtered.values.copy()
     values[0, 1] = np.nextafter(values[0, 1], -9.0)
-    proof = prove(header, edited(ticks, 60, sent=Commands(values, False)))
+    proof = prove(header, edited(ticks, 60, filtered=Commands(values, False)))
     assert proof.first.what == "sent heading"
     assert proof.first.boat == "blue_1"
 

@@ -11,7 +11,7 @@ class Unheeded(Shield):
     """Decides, and sends what was wanted."""
 
     def decide(self, fleet, wanted, surroundings=None):
-        return dataclasses.replace(super().decide(fleet, wanted, surroundings), sent=wanted)
+        return dataclasses.replace(super().decide(fleet, wanted, surroundings), filtered=wanted)
 
 
 if __name__ == "__main__":

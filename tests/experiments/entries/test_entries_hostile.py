@@ -41,7 +41,7 @@ FORFEITS = {
     "it stops its keeper": ("os.kill(os.getppid(), 19)\ntime.sleep(600)", "stopped the process that watches it"),
     "it writes into our pipe": ("os.write(int(sys.argv[2]), b'\\xff' * 64)\ntime.sleep(600)", "a message of"),
     "it answers for us": (
-        "import struct\nos.write(int(sys.argv[2]), struct.pack('<I', 2) + b'[]')\nreturn 4",
+        "import struct\nos.write(int(sys.argv[2]), struct.pack('!i', 2) + b'[]')\nreturn 4",
         "no object|not asked",
     ),
     "it closes all": ("os.closerange(0, 256)\nreturn 4", "did not answer within 1 s|exit status"),

@@ -144,7 +144,7 @@ def test_the_command_goes_on_where_it_was_cut_off_and_makes_a_page(tmp_path, few
         (["--shield-set", "dt_s=0.5"], "dt_s cannot be set here"),
         (["--shield-set", "delay_s=0.5"], "delay_s cannot be set here"),
         (["--shield-set", "coordination=per_boat"], "coordination cannot be set here"),
-        (["--shield-set", "tail=1"], "did you mean 'straight_horizon_s'"),
+        (["--shield-set", "straight_horizon=1"], "did you mean 'straight_horizon_s'"),
         (["--radius", "9"], "choose one within"),
         (["--jobs", "0"], "at least 1"),
     ],

@@ -119,7 +119,7 @@ def test_other_settings_reach_the_shield():
     assert sets_config(RADIUS_M, {"adversary_horizon_s": 5.0}) == ShieldConfig(
         profile="ramming", buffer_m=0.0, adversary_horizon_s=5.0
     )
-    assert sets_config(RADIUS_M, {}).adversary_horizon_s == math.inf
+    assert sets_config(RADIUS_M, {}).effective_adversary_horizon_s == math.inf
     with pytest.raises(ConfigError, match="did you mean 'straight_horizon_s'"):
         sets_config(RADIUS_M, {"tail": 1.0})
 

@@ -69,7 +69,7 @@ class Unheeded(Shield):
     """A shield whose decisions nobody heeds: what is wanted is sent."""
 
     def decide(self, fleet, wanted, surroundings=None):
-        return replace(super().decide(fleet, wanted, surroundings), sent=wanted)
+        return replace(super().decide(fleet, wanted, surroundings), filtered=wanted)
 
 
 @dataclass

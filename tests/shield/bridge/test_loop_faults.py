@@ -33,7 +33,7 @@ class Unheeded(Shield):
     """Decides, and sends what was wanted."""
 
     def decide(self, fleet, wanted, surroundings=None):
-        return dataclasses.replace(super().decide(fleet, wanted, surroundings), sent=wanted)
+        return dataclasses.replace(super().decide(fleet, wanted, surroundings), filtered=wanted)
 
 
 def test_without_the_shield_they_would():
