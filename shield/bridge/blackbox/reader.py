@@ -188,6 +188,7 @@ def read_records(file: IO[bytes], tell: Tell) -> Iterator[Any]:
         file: at its beginning.
         tell: gets a text about each part that cannot be read; nothing is raised for them.
     """
+    closed = False
     try:
         for item in StreamReader(file, emit_chunks=True, record_size_limit=LARGEST_RECORD).records:
             if isinstance(item, Chunk):
@@ -198,12 +199,15 @@ def read_records(file: IO[bytes], tell: Tell) -> Iterator[Any]:
                     continue
                 yield from parts
             elif isinstance(item, (Schema, Channel, Message, Footer)):
+                closed = isinstance(item, Footer)
                 yield item
         if file.read(1):
             tell("after its end more bytes follow, which were not read")
     except EndOfFile:
         return  # cut off: the footer that was not there tells
     except _DAMAGE as error:
+        if isinstance(error, struct.error) and not closed and not file.read(1):
+            return  # cut off within a number: the same
         tell(f"from some point on it makes no sense ({type(error).__name__})")
 
 

@@ -121,7 +121,7 @@ def test_other_settings_reach_the_shield():
     )
     assert sets_config(RADIUS_M, {}).effective_adversary_horizon_s == math.inf
     with pytest.raises(ConfigError, match="did you mean 'straight_horizon_s'"):
-        sets_config(RADIUS_M, {"tail": 1.0})
+        sets_config(RADIUS_M, {"straight_horizon": 1.0})
 
 
 @pytest.mark.parametrize("radius", ["0", "-1", "nan", "inf", "9"])
