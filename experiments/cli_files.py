@@ -47,7 +47,7 @@ def check_files(function: Callable[..., Any], given: Mapping[str, Any]) -> None:
         ConfigError: one file is named for two things, or is what the command writes into its folder of results, that of
             ``--json`` cannot be written, or one to write is there.
     """
-    spelled = {name: _spelling(name, hint) for name, hint in _hints(function).items()}
+    spelled = {name: _spelling(name, hint) for name, hint in hints_of(function).items()}
     check_apart({spelled.get(name, name): value for name, value in given.items()})
     check_json_file(given.get("json_file"))
     folders = [given[name] for name in _folders(function) if isinstance(given.get(name), Path)]
@@ -62,7 +62,7 @@ def check_files(function: Callable[..., Any], given: Mapping[str, Any]) -> None:
 
 def written_by(function: Callable[..., Any]) -> list[str]:
     """Names of the arguments of a command that are marked as files it writes."""
-    return [name for name, hint in _hints(function).items() if NEW in typing.get_args(hint)[1:]]
+    return [name for name, hint in hints_of(function).items() if NEW in typing.get_args(hint)[1:]]
 
 
 def check_apart(given: Mapping[str, Any]) -> None:
@@ -142,13 +142,19 @@ def _files(value: Any) -> Iterator[Path]:
             continue
 
 
-def _hints(function: Callable[..., Any]) -> dict[str, Any]:
-    return typing.get_type_hints(function, include_extras=True)
+def hints_of(function: Callable[..., Any]) -> dict[str, Any]:
+    """Hints of a function as written: Python 3.10 puts an Optional round what is annotated and None by default."""
+    hints = typing.get_type_hints(function, include_extras=True)
+    for name, hint in hints.items():
+        parts = [part for part in typing.get_args(hint) if part is not type(None)]
+        if typing.get_origin(hint) is typing.Union and len(parts) == 1 and hasattr(parts[0], "__metadata__"):
+            hints[name] = parts[0]
+    return hints
 
 
 def _folders(function: Callable[..., Any]) -> list[str]:
     """Names of the arguments that are folders of results."""
-    infos = {name: typing.get_args(hint)[1:] for name, hint in _hints(function).items()}
+    infos = {name: typing.get_args(hint)[1:] for name, hint in hints_of(function).items()}
     return [name for name, found in infos.items() if any(getattr(info, "metavar", "") == "DIR" for info in found)]
 
 

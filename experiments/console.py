@@ -19,7 +19,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from steerclear.shield.exceptions import SteerclearError
 from typer.core import TyperCommand, TyperOption
 
-from .cli_files import check_files
+from .cli_files import check_files, hints_of
 from .faults import fault_words, machine_words
 from .runner import Interrupted
 from .terminal import SafeConsole
@@ -160,7 +160,7 @@ def _options_of(
     function: Callable[..., Any], defaults: dict[str, Any]
 ) -> tuple[list[inspect.Parameter], dict[str, type[Any]]]:
     """Options of a function, and its groups of options by the name of the parameter."""
-    hints = typing.get_type_hints(function, include_extras=True)
+    hints = hints_of(function)
     options, groups = list[inspect.Parameter](), dict[str, type[Any]]()
     for name, parameter in inspect.signature(function).parameters.items():
         if dataclasses.is_dataclass(hints[name]):
