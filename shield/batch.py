@@ -36,6 +36,7 @@ class BatchedShield:
         team: team of the n boats.
         surroundings: static constraints, the same for all games.
         flag_of: team whose flag's circle the surroundings' ``stops`` are; None: nobody's in particular.
+        threads: threads that share the games; what is decided is the same, bit for bit. More than cores are no use.
 
     Attributes:
         sent: (B, n, 2) commands of the last decisions; this and the others are written anew by every call.
@@ -54,14 +55,16 @@ class BatchedShield:
         team: tuple[int, ...],
         surroundings: Surroundings = OPEN_WATER,
         flag_of: int | None = None,
+        threads: int = 1,
     ) -> None:
         if not isinstance(config, ShieldConfig) or not isinstance(surroundings, Surroundings):
             found = f"{type(config).__name__} and {type(surroundings).__name__}"
             raise ConfigError(f"config and surroundings are {found}; give ShieldConfig.of(...) and Surroundings(...)")
         if config.coordination != "team":
             raise ConfigError("a batch decides for whole teams at once: set coordination='team'")
-        if isinstance(games, bool) or not isinstance(games, (int, np.integer)) or games < 1:
-            raise ConfigError(f"games is {games!r}; give a whole number >= 1")
+        for name, number in (("games", games), ("threads", threads)):
+            if isinstance(number, bool) or not isinstance(number, (int, np.integer)) or number < 1:
+                raise ConfigError(f"{name} is {number!r}; give a whole number >= 1")
         self.config, self.flag_of, self.surroundings = config, flag_of, surroundings
         self.platforms, self.team = _kinds(platforms), _teams(team)
         if len(self.platforms) != len(self.team) or not self.platforms:
@@ -71,7 +74,7 @@ class BatchedShield:
         boats = boats_of(config, self.platforms, self.team)
         self._barriers = barriers_of(config)
         self._static = surroundings.pack(config, self._barriers.arrays)
-        self._deciders = Deciders(config, games, boats, self._static, solver_of(config.solver))
+        self._deciders = Deciders(config, games, boats, self._static, solver_of(config.solver), threads)
         scene = self._deciders.scene
         self.sent, self.reason = scene.sent, scene.reasons
         self.serves: int | None = None

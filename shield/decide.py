@@ -7,6 +7,8 @@ change, and blends what is left of the backups with the nominal commands; it com
 from __future__ import annotations
 
 import math
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -34,7 +36,7 @@ from .platforms import layout as L
 from .platforms.usv import wrap_degrees
 from .shared import share, type_of
 from .tracks import fill_memory, queue_commands, run_on, run_on_commands, steps_of_delay, turn_round
-from .workspace import Boats, Scene, Static, all_spent, new_scene, unchanged
+from .workspace import Boats, Scene, Static, all_spent, new_scene, part_of, unchanged
 
 ROUNDING_S = 1e-9
 """Times this short are none: what is left of a sum of steps."""
@@ -306,6 +308,7 @@ class Deciders:
         boats: constants of the n boats.
         static: static constraints and registered barriers, the same for all.
         solver: what answers programs; None: the compiled one.
+        threads: how many share the B decisions; what is decided is the same. Other solvers take one.
     """
 
     def __init__(
@@ -315,13 +318,17 @@ class Deciders:
         boats: Boats,
         static: Static,
         solver: Solver | None = None,
+        threads: int = 1,
     ) -> None:
-        self.scene = new_scene(number, boats, static, tuning_of(config), steps_of_delay(config))
-        self._solver = solver
+        self._delay = steps_of_delay(config)
+        self.scene = new_scene(number, boats, static, tuning_of(config), self._delay)
+        self._solver, self._threads = solver, min(threads, number)
         self._decide_all: Any = None
+        self._parts: list[Scene] = []
+        self._pool: ThreadPoolExecutor | None = None
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_decide_all": None}  # compiled code is of one process
+        return self.__dict__ | {"_decide_all": None, "_parts": [], "_pool": None}  # those are of one process
 
     def forget(self, which: slice | BoolArray) -> None:
         """Forget the backups of some deciders, and the commands on their way."""
@@ -333,19 +340,40 @@ class Deciders:
         """The scene with these static constraints, from now on."""
         if self.scene.static is not static:
             self.scene = share(self.scene._replace(static=static))
-            self._decide_all = None
+            self._decide_all, self._parts = None, []
         return self.scene
 
     def decide(self, static: Static) -> None:
         """Write into the scene what is decided about what is given, beside these static constraints."""
         self.beside(static)
-        if self._solver is None:
-            if self._decide_all is None:
-                made = getattr(decide_all, "compile", None)  # there is none where NUMBA_DISABLE_JIT is set
-                self._decide_all = decide_all if made is None else made((type_of(self.scene),))  # saves 3 us a call
-            self._decide_all(self.scene)
+        if self._solver is not None:
+            for b in range(len(self.scene.given)):
+                take_up(b, self.scene)
+                _decide_with(self._solver, self.scene)
+                hand_over(b, self.scene)
             return
-        for b in range(len(self.scene.given)):
-            take_up(b, self.scene)
-            _decide_with(self._solver, self.scene)
-            hand_over(b, self.scene)
+        if self._decide_all is None:
+            made = getattr(decide_all, "compile", None)  # there is none where NUMBA_DISABLE_JIT is set
+            self._decide_all = decide_all if made is None else made((type_of(self.scene),))  # saves 3 us a call
+        if self._threads == 1:
+            self._decide_all(self.scene)
+        else:
+            self._decide_in_threads()
+
+    def _decide_in_threads(self) -> None:
+        """Share the decisions; each thread has its own scratch and counts its own faults of registered barriers."""
+        faults = self.scene.static.registered.faults
+        if self._pool is None:
+            self._pool = ThreadPoolExecutor(self._threads, "shield")
+        if not self._parts:
+            bounds = np.linspace(0, len(self.scene.given), self._threads + 1).astype(np.int64).tolist()
+            for first, last in pairwise(bounds):
+                static = self.scene.static._replace(
+                    registered=self.scene.static.registered._replace(faults=np.zeros_like(faults))
+                )
+                self._parts.append(part_of(self.scene, static, first, last, self._delay))
+        for part in self._parts:
+            part.static.registered.faults[:] = 0
+        list(self._pool.map(self._decide_all, self._parts))
+        for part in self._parts:
+            faults += part.static.registered.faults

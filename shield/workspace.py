@@ -271,6 +271,14 @@ def new_scene(decisions: int, boats: Boats, static: Static, tuning: Tuning, dela
     return share(Scene(**fields))
 
 
+def part_of(scene: Scene, static: Static, first: int, last: int, delay: int) -> Scene:
+    """Decisions ``first`` to ``last`` - 1 of a scene, the very arrays, with scratch of their own for another thread."""
+    part = new_scene(last - first, scene.boats, static, scene.tuning, delay)
+    hints = get_type_hints(Scene, include_extras=True)
+    of_all = [name for name, hint in hints.items() if "B" in get_args(hint)]
+    return share(part._tuple._replace(**{name: getattr(scene, name)[first:last] for name in of_all}))
+
+
 def new_memory(decisions: int, boats: int) -> Array:
     """Memory, (B, n, N_MEMORY + n), of boats that hold no manoeuvre yet."""
     memories = np.zeros((decisions, boats, N_MEMORY + boats))

@@ -22,7 +22,11 @@ from .reading import team_number
 
 
 def games_shield(
-    core: Any, config: ShieldConfig | None = None, team: str | int = "blue", keep_out: bool = True
+    core: Any,
+    config: ShieldConfig | None = None,
+    team: str | int = "blue",
+    keep_out: bool = True,
+    threads: int = 1,
 ) -> BatchedShield:
     """Build the shield for a `BatchedMctf`: its boats, field edge, obstacles and the own flag's circle.
 
@@ -32,6 +36,7 @@ def games_shield(
             it are the games', where those are larger.
         team: "blue" or "red", the team that will be shielded, see `BatchedShield.filter_for`.
         keep_out: keep clear of the own flag's circle; boats that enter it while the flag is home are stopped.
+        threads: see `BatchedShield`.
 
     Raises:
         ConfigError: unknown team, another step than the games', or a setting that a batch cannot honour.
@@ -45,7 +50,7 @@ def games_shield(
     check_step(settings, facts)
     warn_of_distances(settings, facts, number)
     around = surroundings_of(core, number, keep_out)
-    return BatchedShield(settings, core.n_games, platforms_of(core), tuple(core.team.tolist()), around, number)
+    return BatchedShield(settings, core.n_games, platforms_of(core), tuple(core.team.tolist()), around, number, threads)
 
 
 def check_games(shield: BatchedShield, core: Any, team: int | None = None) -> None:

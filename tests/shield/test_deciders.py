@@ -12,6 +12,7 @@ from steerclear.shield import Reason, Shield, ShieldConfig, Surroundings
 from steerclear.shield.batch import BatchedShield
 from steerclear.shield.commands import Commands
 from steerclear.shield.decision import Decisions
+from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.workspace import OURS
 
 TEAM = (0, 0, 0, 1, 1)
@@ -49,6 +50,33 @@ def test_a_single_decision_is_a_batch_of_one_bit_for_bit(delay_s):
             batch, singles = copy.deepcopy(batch), pickle.loads(pickle.dumps(singles))
         step_all(packed(("heron",) * 5), states, sent, 0.1)
     assert changed > 20
+
+
+@pytest.mark.parametrize("threads", [2, 3, 9])
+def test_threads_share_the_games_of_a_batch_and_decide_the_same_bits(threads):
+    config = ShieldConfig(delay_s=0.2)
+    alone, shared = (BatchedShield(config, 7, ("heron",) * 5, TEAM, threads=k) for k in (1, threads))
+    states = np.stack([crowd(seed).state for seed in range(7)])
+    ours, more = np.tile(np.array(TEAM) == 0, (7, 1)), states.copy()
+    for step in range(40):
+        wanted = np.random.default_rng(step).uniform([0.0, -90.0], [2.0, 90.0], (7, 5, 2))
+        sent = alone.decide(states, wanted, ours)
+        assert bits(sent) == bits(shared.decide(more, wanted, ours))
+        assert bits(alone.safety_margin_m) == bits(shared.safety_margin_m)
+        assert (alone.reason == shared.reason).all()
+        step_all(packed(("heron",) * 5), states, sent, 0.1)
+        more[:] = states
+        if step == 20:
+            shared = copy.deepcopy(shared)
+            alone.reset(np.arange(7) > 4)
+            shared.reset(np.arange(7) > 4)
+    assert (alone.reason != Reason.PASSED).any()
+
+
+@pytest.mark.parametrize("threads", [0, -1, 1.5, True, None])
+def test_no_number_of_threads_is_refused(threads):
+    with pytest.raises(ConfigError, match=r"threads is .*; give a whole number >= 1"):
+        BatchedShield(ShieldConfig(), 2, ("heron",) * 5, TEAM, threads=threads)
 
 
 def told(coordination, **more) -> Decisions:
