@@ -322,7 +322,7 @@ class Deciders:
     ) -> None:
         self._delay = steps_of_delay(config)
         self.scene = new_scene(number, boats, static, tuning_of(config), self._delay)
-        self._solver, self._threads = solver, min(threads, number)
+        self._solver, self._threads = solver, max(1, min(threads, number))
         self._decide_all: Any = None
         self._parts: list[Scene] = []
         self._pool: ThreadPoolExecutor | None = None
