@@ -18,7 +18,7 @@ from .hull import Steer, Turn
 from .sensing import Snapshot
 from .settings import AutopilotSettings
 from .telemetry import CAN_SEND, Telemetry
-from .vehicle import Mode, Parameters, Streams, Vehicle
+from .vehicle import PARAMETERS, Mode, Streams, Vehicle
 
 COMPONENT = 1
 ACCEPTED, DENIED = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED
@@ -30,8 +30,7 @@ _FORCE = 21196.0
 _POSITION, _VELOCITY, _ACCELERATION, _YAW, _YAW_RATE = 7, 56, 448, 1024, 2048
 """Bits of a position target's type mask that tell to ignore a part."""
 _ATTITUDE_RATE_IGNORED, _THRUST_IGNORED = 4, 64
-_LOCAL_FRAMES, _BODY_FRAMES = (1, 7), (8, 9)
-_GLOBAL_FRAMES = (0, 3, 5, 6, 10, 11)
+_LOCAL_FRAMES, _BODY_FRAMES, _GLOBAL_FRAMES = (1, 7), (8, 9), (0, 3, 5, 6, 10, 11)
 
 
 class Autopilot:
@@ -67,48 +66,19 @@ class Autopilot:
         key: bytes | None = None,
     ) -> None:
         self.system_id, self.frame, self.snapshot = system_id, frame, snapshot
-        self.vehicle = Vehicle(settings, Parameters(settings.parameters, settings.firmware.timeout_parameter))
-        self.vehicle.parameters.set("SYSID_THISMAV", system_id)
-        self.streams = Streams(settings.top_rate_hz, CAN_SEND)
-        self.telemetry = Telemetry(self.vehicle, frame)
+        self.vehicle = Vehicle(settings)
+        self.vehicle.set_parameter("SYSID_THISMAV", system_id)
         self.counts = {"taken": 0, "refused": 0, "ignored": 0}
-        self._write = write
-        self._signing = None if key is None else Signing(key)
+        self._write, self._signing = write, None if key is None else Signing(key)
         self.boot(snapshot.time_s)
 
     def boot(self, now_s: float) -> None:
         """Power on, or restart: everything but the parameters and the key is forgotten."""
         self.now_s, self.reboot_wanted = now_s, False
         self.vehicle.boot(now_s)
-        self.streams.reset()
-        self.telemetry.origin = None
+        self.streams = Streams(self.vehicle.settings.top_rate_hz, frozenset(CAN_SEND))
+        self._telemetry = Telemetry(self.vehicle, self.frame)
         self._codec = Codec(self.system_id, COMPONENT, self._signing)
-
-    @property
-    def true_rad(self) -> float:
-        """Its heading clockwise from true north."""
-        return self.frame.heading_to_true_rad(self.snapshot.heading_rad)
-
-    @property
-    def top_mps(self) -> float:
-        """WP_SPEED, m/s."""
-        return self.vehicle.parameters["WP_SPEED"]
-
-    def steer(self, true_rad: float, speed_mps: float) -> Steer:
-        """A target of a true heading."""
-        return Steer(self.frame.heading_to_field_rad(true_rad), speed_mps)
-
-    def send(self, message: Any) -> None:
-        """Send a message."""
-        self._write(self._codec.encode(message))
-
-    def send_now(self, message: int) -> int:
-        """Send one of the known messages, outside its interval; the result to acknowledge."""
-        built = self.telemetry.build(message, self.snapshot, self.now_s) if message in CAN_SEND else None
-        if built is None:
-            return FAILED
-        self.send(built)
-        return ACCEPTED
 
     def tick(self, now_s: float) -> None:
         """Look at the clocks and send what is due."""
@@ -116,9 +86,9 @@ class Autopilot:
         self.vehicle.tick(now_s)
         while self.vehicle.texts:
             severity, text = self.vehicle.texts.popleft()
-            self.send(mavlink.MAVLink_statustext_message(severity, text.encode()[:_TEXT_BYTES]))
+            self._send(mavlink.MAVLink_statustext_message(severity, text.encode()[:_TEXT_BYTES]))
         for message in self.streams.due(now_s):
-            self.send_now(message)
+            self._send_now(message)
 
     def receive(self, packet: bytes, now_s: float) -> None:
         """Take one packet; what is damaged, wrongly signed or for others has no effect."""
@@ -127,75 +97,71 @@ class Autopilot:
         if message is None:
             self.counts["refused"] += 1
             return
-        handler = _HANDLERS.get(message.get_msgId())
+        handler = _HANDLERS.get(message.get_type())
         if handler is None or getattr(message, "target_system", 0) not in (0, self.system_id):
             self.counts["ignored"] += 1
             return
         self.counts["taken"] += 1
         handler(self, message)
 
-    def change_mode(self, base: int, number: float) -> int:
-        """Change mode as DO_SET_MODE and SET_MODE ask; the result to acknowledge."""
-        if not base & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
-            return DENIED
-        whole = int(number) if 0.0 <= number <= 255.0 else -1
-        return ACCEPTED if self.vehicle.set_mode(whole, self.now_s) else FAILED
+    def _send(self, message: Any) -> None:
+        self._write(self._codec.encode(message))
 
-    def take(self, target: Steer | Turn | None) -> bool:
-        """Obey a target where there is one; whether it is obeyed."""
-        return target is not None and self.vehicle.take(target, self.now_s)
+    def _send_now(self, message: int) -> int:
+        """Send one of the known messages, outside its interval; the result to acknowledge."""
+        built = self._telemetry.build(message, self.snapshot, self.now_s) if message in CAN_SEND else None
+        if built is None:
+            return FAILED
+        self._send(built)
+        return ACCEPTED
 
-    def _on_attitude_target(self, message: Any) -> None:
-        self.counts["ignored"] += not self.take(attitude_target(message, self))
+    def _acknowledge(self, command: int, result: int, message: Any) -> None:
+        who = (message.get_srcSystem(), message.get_srcComponent())
+        self._send(mavlink.MAVLink_command_ack_message(command, result, 0, 0, *who))
 
-    def _on_position_target(self, message: Any) -> None:
-        self.counts["ignored"] += not self.take(position_target(message, self))
+    def _on_target(self, message: Any) -> None:
+        read = attitude_target if message.get_type() == "SET_ATTITUDE_TARGET" else position_target
+        target = read(message, self)
+        self.counts["ignored"] += target is None or not self.vehicle.take(target, self.now_s)
 
     def _on_command(self, message: Any) -> None:
         handler = _COMMANDS.get(message.command)
-        usable = all(math.isfinite(getattr(message, f"param{i}")) or i > 2 for i in range(1, 5))
+        usable = math.isfinite(message.param1) and math.isfinite(message.param2)
         result = UNSUPPORTED if handler is None or not usable else handler(self, message)
         self._acknowledge(message.command, result, message)
 
     def _on_set_mode(self, message: Any) -> None:
-        result = self.change_mode(message.base_mode, message.custom_mode)
+        result = _change_mode(self, message.base_mode, message.custom_mode)
         self._acknowledge(mavlink.MAVLINK_MSG_ID_SET_MODE, result, message)
-
-    def _acknowledge(self, command: int, result: int, message: Any) -> None:
-        who = (message.get_srcSystem(), message.get_srcComponent())
-        self.send(mavlink.MAVLink_command_ack_message(command, result, 0, 0, *who))
 
     def _on_heartbeat(self, message: Any) -> None:
         if message.get_srcSystem() == int(self.vehicle.parameters["SYSID_MYGCS"]):
             self.vehicle.hear_ground(self.now_s)
 
-    def _on_stream_request(self, message: Any) -> None:
-        self.streams.set_group(message.req_stream_id, message.req_message_rate if message.start_stop else 0)
-
     def _on_time(self, message: Any) -> None:
         if message.tc1 == 0:
-            uptime_ns = round(self.vehicle.uptime_s(self.now_s) * 1e9)
-            self.send(mavlink.MAVLink_timesync_message(max(uptime_ns, 1), message.ts1))
+            uptime_ns = round((self.now_s - self.vehicle.booted_s) * 1e9)
+            self._send(mavlink.MAVLink_timesync_message(max(uptime_ns, 1), message.ts1))
 
     def _on_parameter_read(self, message: Any) -> None:
-        names, index = self.vehicle.parameters.names, message.param_index
+        names, index = list(self.vehicle.parameters), message.param_index
         self._send_parameter(message.param_id.rstrip("\0") if index < 0 else "".join(names[index : index + 1]))
 
     def _on_parameter_list(self, message: Any) -> None:
-        for name in self.vehicle.parameters.names:
+        for name in self.vehicle.parameters:
             self._send_parameter(name)
 
     def _on_parameter_set(self, message: Any) -> None:
         name = message.param_id.rstrip("\0")
-        if math.isfinite(message.param_value) and self.vehicle.parameters.set(name, message.param_value):
+        if self.vehicle.set_parameter(name, message.param_value):
             self._send_parameter(name)
 
     def _send_parameter(self, name: str) -> None:
         """Answer with a parameter; of one that does not exist nothing is said."""
         table = self.vehicle.parameters
         if name in table:
-            place = (len(table.names), table.names.index(name))
-            self.send(mavlink.MAVLink_param_value_message(name.encode(), table[name], table.type_of(name), *place))
+            place = (PARAMETERS[name][1], len(table), list(table).index(name))
+            self._send(mavlink.MAVLink_param_value_message(name.encode(), table[name], *place))
 
 
 Target = Steer | Turn
@@ -206,11 +172,12 @@ def attitude_target(message: Any, boat: Autopilot) -> Target | None:
     values = (*message.q, message.thrust, message.body_yaw_rate)
     if message.type_mask & _THRUST_IGNORED or not all(map(math.isfinite, values)):
         return None
-    speed = max(-1.0, min(1.0, message.thrust)) * boat.top_mps
+    speed = max(-1.0, min(1.0, message.thrust)) * boat.vehicle.parameters["WP_SPEED"]
     if not message.type_mask & _ATTITUDE_RATE_IGNORED:
         return Turn(message.body_yaw_rate, speed)
     w, x, y, z = message.q
-    return boat.steer(math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)), speed)
+    heading = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    return Steer(boat.frame.heading_to_field_rad(heading), speed)
 
 
 def position_target(message: Any, boat: Autopilot) -> Target | None:
@@ -229,15 +196,28 @@ def position_target(message: Any, boat: Autopilot) -> Target | None:
     if (has_yaw and has_rate) or not (has_velocity or has_yaw or has_rate):
         return None
     in_body = not is_global and message.coordinate_frame in _BODY_FRAMES
-    turned = boat.true_rad if in_body else 0.0
-    speed = min(math.hypot(message.vx, message.vy), boat.top_mps) if has_velocity else 0.0
+    top = boat.vehicle.parameters["WP_SPEED"]
+    speed = min(math.hypot(message.vx, message.vy), top) if has_velocity else 0.0
     # the trap: with yaw or yaw rate the sign is that of x, also where x is north and not ahead
     untrapped = has_yaw and not in_body and not boat.vehicle.settings.firmware.yaw_trap
     if (has_yaw or has_rate) and message.vx < 0.0 and not untrapped:
         speed = -speed
     if has_rate:
         return Turn(message.yaw_rate, speed)
-    return boat.steer((message.yaw if has_yaw else math.atan2(message.vy, message.vx)) + turned, speed)
+    heading = message.yaw if has_yaw else math.atan2(message.vy, message.vx)
+    return _steer(boat, heading, speed, in_body)
+
+
+def _steer(boat: Autopilot, heading_rad: float, speed_mps: float, relative: bool) -> Steer:
+    """A target of a true heading, or of one from the bow."""
+    own = boat.snapshot.heading_rad
+    return Steer(own + heading_rad if relative else boat.frame.heading_to_field_rad(heading_rad), speed_mps)
+
+
+def _change_mode(boat: Autopilot, base: int, number: float) -> int:
+    if not base & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
+        return DENIED
+    return ACCEPTED if boat.vehicle.set_mode(int(number) if 0.0 <= number <= 255.0 else -1, boat.now_s) else FAILED
 
 
 def _arm(boat: Autopilot, message: Any) -> int:
@@ -251,20 +231,20 @@ def _arm(boat: Autopilot, message: Any) -> int:
 
 def _get_interval(boat: Autopilot, message: Any) -> int:
     wanted = int(message.param1)
-    boat.send(mavlink.MAVLink_message_interval_message(wanted, boat.streams.interval_us(wanted)))
+    boat._send(mavlink.MAVLink_message_interval_message(wanted, boat.streams.interval_us(wanted)))
     return ACCEPTED
-
-
-def _change_speed(boat: Autopilot, message: Any) -> int:
-    return FAILED if boat.vehicle.mode is Mode.GUIDED and boat.vehicle.target is not None else ACCEPTED
 
 
 def _yaw_speed(boat: Autopilot, message: Any) -> int:
     """MAV_CMD_NAV_SET_YAW_SPEED; its speed is not limited."""
     if not boat.vehicle.settings.firmware.yaw_speed_command:
         return UNSUPPORTED
-    start = boat.true_rad if message.param3 == 1.0 else 0.0
-    return ACCEPTED if boat.take(boat.steer(start + math.radians(message.param1), message.param2)) else FAILED
+    target = _steer(boat, math.radians(message.param1), message.param2, relative=message.param3 == 1.0)
+    return ACCEPTED if boat.vehicle.take(target, boat.now_s) else FAILED
+
+
+def _change_speed(boat: Autopilot, message: Any) -> int:
+    return FAILED if boat.vehicle.mode is Mode.GUIDED and boat.vehicle.target is not None else ACCEPTED
 
 
 def _reboot(boat: Autopilot, message: Any) -> int:
@@ -274,29 +254,31 @@ def _reboot(boat: Autopilot, message: Any) -> int:
 
 _COMMANDS: dict[int, Callable[[Autopilot, Any], int]] = {
     mavlink.MAV_CMD_COMPONENT_ARM_DISARM: _arm,
-    mavlink.MAV_CMD_DO_SET_MODE: lambda boat, message: boat.change_mode(int(message.param1), message.param2),
-    mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: lambda boat, message: (
-        ACCEPTED if boat.streams.set_interval(int(message.param1), message.param2) else FAILED
+    mavlink.MAV_CMD_DO_SET_MODE: lambda boat, told: _change_mode(boat, int(told.param1), told.param2),
+    mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: lambda boat, told: (
+        ACCEPTED if boat.streams.set_interval(int(told.param1), told.param2) else FAILED
     ),
     mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: _get_interval,
-    mavlink.MAV_CMD_REQUEST_MESSAGE: lambda boat, message: boat.send_now(int(message.param1)),
+    mavlink.MAV_CMD_REQUEST_MESSAGE: lambda boat, told: boat._send_now(int(told.param1)),
     mavlink.MAV_CMD_DO_CHANGE_SPEED: _change_speed,
     mavlink.MAV_CMD_NAV_SET_YAW_SPEED: _yaw_speed,
     mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: _reboot,
 }
 """What each of COMMAND_LONG and COMMAND_INT does and how it is acknowledged; any other is unsupported."""
 
-_HANDLERS: dict[int, Callable[[Autopilot, Any], None]] = {
-    mavlink.MAVLINK_MSG_ID_HEARTBEAT: Autopilot._on_heartbeat,
-    mavlink.MAVLINK_MSG_ID_COMMAND_LONG: Autopilot._on_command,
-    mavlink.MAVLINK_MSG_ID_COMMAND_INT: Autopilot._on_command,
-    mavlink.MAVLINK_MSG_ID_SET_MODE: Autopilot._on_set_mode,
-    mavlink.MAVLINK_MSG_ID_REQUEST_DATA_STREAM: Autopilot._on_stream_request,
-    mavlink.MAVLINK_MSG_ID_TIMESYNC: Autopilot._on_time,
-    mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_READ: Autopilot._on_parameter_read,
-    mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: Autopilot._on_parameter_list,
-    mavlink.MAVLINK_MSG_ID_PARAM_SET: Autopilot._on_parameter_set,
-    mavlink.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: Autopilot._on_attitude_target,
-    mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED: Autopilot._on_position_target,
-    mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: Autopilot._on_position_target,
+_HANDLERS: dict[str, Callable[[Autopilot, Any], None]] = {
+    "HEARTBEAT": Autopilot._on_heartbeat,
+    "COMMAND_LONG": Autopilot._on_command,
+    "COMMAND_INT": Autopilot._on_command,
+    "SET_MODE": Autopilot._on_set_mode,
+    "REQUEST_DATA_STREAM": lambda boat, told: boat.streams.set_group(
+        told.req_stream_id, told.req_message_rate if told.start_stop else 0
+    ),
+    "TIMESYNC": Autopilot._on_time,
+    "PARAM_REQUEST_READ": Autopilot._on_parameter_read,
+    "PARAM_REQUEST_LIST": Autopilot._on_parameter_list,
+    "PARAM_SET": Autopilot._on_parameter_set,
+    "SET_ATTITUDE_TARGET": Autopilot._on_target,
+    "SET_POSITION_TARGET_LOCAL_NED": Autopilot._on_target,
+    "SET_POSITION_TARGET_GLOBAL_INT": Autopilot._on_target,
 }

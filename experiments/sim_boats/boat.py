@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from steerclear.shield.bridge.fleet_checks import MOOS
@@ -12,7 +12,7 @@ from steerclear.shield.platforms import get_platform
 
 from .autopilot import Autopilot
 from .faults import Faults
-from .hull import Helmsman, Hull, Order
+from .hull import Hull, Keep, Order
 from .moos import Community
 from .sensing import Radio, Sensors
 from .settings import AutopilotSettings, RadioSettings, SimBoat
@@ -21,16 +21,7 @@ from .vehicle import Mode
 
 @dataclass(frozen=True)
 class Setting:
-    """What all boats of a fleet share.
-
-    Attributes:
-        frame: where the field is.
-        autopilot: how autopilots behave.
-        radio: what the radio does.
-        noise: of the sensors: 0 none, 1 as measured.
-        key: signing key; None: unsigned.
-        warp: times faster than real time.
-    """
+    """What all boats of a fleet share; noise: 0 none, 1 as measured; warp: times faster than real time."""
 
     frame: FieldFrame
     autopilot: AutopilotSettings
@@ -68,24 +59,22 @@ class Boat:
         seed: np.random.SeedSequence,
     ) -> None:
         seeds = [np.random.default_rng(child) for child in seed.spawn(4)]
-        platform = get_platform(spec.platform)
-        self.spec = spec
-        self.system_id = system_id
-        self.hull = Hull.at(platform, *start, setting.autopilot.brake_mps2)
-        self.helmsman = Helmsman(self.hull)
+        platform, frame = get_platform(spec.platform), setting.frame
+        self.spec, self.system_id = spec, system_id
+        self.hull = Hull(platform, *start, setting.autopilot.brake_mps2)
         self.down, self.up = Radio(setting.radio, seeds[0]), Radio(setting.radio, seeds[1])
-        self._sensors = Sensors(setting.frame, setting.noise, seeds[2])
-        self.write: Callable[[bytes], None] = _nowhere
-        seen = self._sensors.sense(self.hull, 0.0)
-        settings = _with_top_speed(setting.autopilot, platform.max_speed_mps)
-        self.autopilot = Autopilot(system_id, settings, setting.frame, seen, self._transmit, setting.key)
-        self.faults = Faults(self.autopilot, self.down, self.up, setting.frame, seeds[3])
+        self._sensors = Sensors(frame, setting.noise, seeds[2])
+        self.write: Callable[[bytes], None] = lambda packet: None
+        self.seen = self._sensors.sense(self.hull, 0.0)
+        top = dict.fromkeys(("WP_SPEED", "CRUISE_SPEED"), platform.max_speed_mps)  # unless it is told otherwise
+        settings = replace(setting.autopilot, parameters={**top, **setting.autopilot.parameters})
+        self.autopilot = Autopilot(system_id, settings, frame, self.seen, self._transmit, setting.key)
+        self.faults = Faults(self.autopilot, self.down, self.up, frame, seeds[3])
         self.community: Community | None = None
         if spec.address is not None and spec.address.startswith(MOOS):
             precbf = platform if spec.gate == "pid" else None
-            self.community = Community(spec.name, spec.address, setting.frame, setting.warp, precbf)
-        self.order: Order = self._ordered()
-        self.seen = seen
+            self.community = Community(spec.name, spec.address, frame, setting.warp, precbf)
+        self.order: Order = Keep()
 
     @property
     def has_link(self) -> bool:
@@ -106,9 +95,10 @@ class Boat:
         return self.autopilot.vehicle.mode is Mode.HOLD
 
     def step(self, time_s: float, order: Order | None = None) -> None:
-        """Move by one step, to ``time_s``, as its autopilot orders or as given."""
-        self.order = self._ordered() if order is None else order
-        self.helmsman.step(self.faults.misled(self.order))
+        """Move by one step, to ``time_s``, as given, else as who steers it aboard orders."""
+        aboard = self.autopilot.vehicle if self.community is None else self.community
+        self.order = aboard.order() if order is None else order
+        self.hull.obey(self.faults.misled(self.order))
         self.seen = self._sensors.sense(self.hull, time_s)
 
     def tick(self, now_s: float) -> None:
@@ -119,43 +109,24 @@ class Boat:
             return
         for packet in self.up.take(now_s):
             self.autopilot.receive(packet, now_s)
-        if self.autopilot.reboot_wanted:
-            self.restart(now_s)
+        if self.autopilot.reboot_wanted:  # the boat runs on without motors
+            self.hull.forget()
+            self.autopilot.boot(now_s)
         self.autopilot.snapshot = self.faults.sensed(self.seen, now_s)
         if self.has_link and not self.faults.is_dark:
             self.autopilot.tick(now_s)
-            self.deliver(now_s)
+            self._deliver(now_s)
 
     def hear(self, packet: bytes, now_s: float) -> None:
         """A packet leaves for this boat."""
         self.up.put(packet, now_s)
         for arrived in self.up.take(now_s):
             self.autopilot.receive(arrived, now_s)
-        self.deliver(now_s)
+        self._deliver(now_s)
 
-    def deliver(self, now_s: float) -> None:
-        """Hand over what has crossed the radio."""
+    def _deliver(self, now_s: float) -> None:
         for packet in self.down.take(now_s):
             self.write(packet)
 
-    def restart(self, now_s: float) -> None:
-        """The autopilot boots anew; the boat runs on without motors."""
-        self.hull.forget()
-        self.autopilot.boot(now_s)
-
-    def _ordered(self) -> Order:
-        """What it is told by who steers it aboard."""
-        return self.autopilot.vehicle.order() if self.community is None else self.community.order()
-
     def _transmit(self, packet: bytes) -> None:
         self.down.put(packet, self.autopilot.now_s)
-
-
-def _nowhere(packet: bytes) -> None:
-    """Where packets go of a boat that nobody hears."""
-
-
-def _with_top_speed(settings: AutopilotSettings, top_mps: float) -> AutopilotSettings:
-    """Settings whose WP_SPEED is the platform's top speed, unless it is given."""
-    parameters = {"WP_SPEED": top_mps, "CRUISE_SPEED": top_mps} | dict(settings.parameters)
-    return AutopilotSettings(**{**vars(settings), "parameters": parameters})

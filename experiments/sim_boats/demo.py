@@ -6,6 +6,7 @@ import re
 from dataclasses import fields, replace
 from importlib import resources
 from pathlib import Path
+from typing import Any
 from zlib import crc32
 
 import numpy as np
@@ -36,28 +37,20 @@ def off_platform(platform: Platform, share: float, boat: str, seed: int) -> Plat
     if share == 0.0:
         return platform
     rng = np.random.default_rng([seed, crc32(boat.encode())])
-    changed = {
-        entry.name: _off(getattr(platform, entry.name), share, rng)
-        for entry in fields(Platform)
-        if entry.name not in KEPT
-    }
+
+    def off(value: float) -> float:
+        return value * (1.0 + share * float(rng.choice((-1.0, 1.0))))
+
+    changed: dict[str, Any] = {}
+    for name in (entry.name for entry in fields(Platform) if entry.name not in KEPT):
+        value = getattr(platform, name)
+        is_pid = isinstance(value, Gains)
+        changed[name] = replace(value, kp=off(value.kp), kd=off(value.kd)) if is_pid else off(float(value))
     changed["turn_loss"] = min(1.0, float(changed["turn_loss"]))
     return replace(platform, name=f"{platform.name}_off", **changed)
 
 
-def _off(value: float | Gains, share: float, rng: np.random.Generator) -> float | Gains:
-    if isinstance(value, Gains):
-        return replace(value, kp=_scaled(value.kp, share, rng), kd=_scaled(value.kd, share, rng))
-    return _scaled(float(value), share, rng)
-
-
-def _scaled(value: float, share: float, rng: np.random.Generator) -> float:
-    return value * (1.0 + share * float(rng.choice((-1.0, 1.0))))
-
-
 NAME = "demo_fleet.yaml"
-
-
 LINKS = ("mavlink", "moos")
 MOOS_PORTS = (9001, 9002, 9003)
 """Ports of our boats' MOOSDBs in the file of boats that run MOOS."""

@@ -5,12 +5,12 @@ A planned fault is written ``BOAT:KIND@TIME[+DURATION][,OPTION=VALUE...]``.
 
 from __future__ import annotations
 
-import dataclasses
 import difflib
 import json
 import math
 import re
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,7 +28,7 @@ Change = Callable[[Snapshot, float], Snapshot]
 """A fault of what the autopilot knows of itself: the truth and the time in, what it believes out."""
 
 
-@dataclasses.dataclass
+@dataclass(frozen=True)
 class Fault:
     """One that acts now; which parts it has depends on its kind.
 
@@ -53,13 +53,13 @@ class Fault:
 
 
 class Faults:
-    """The faults of one boat.
+    """The faults of one boat: of its autopilot and of its radio to (down) and from (up) the commander.
 
-    Args:
-        autopilot: the boat's.
-        down, up: its radio, to and from the commander.
-        frame: where the field is.
-        random: random numbers of the faults.
+    Attributes:
+        active: by kind, those that act now.
+        is_dark: whether the autopilot is off.
+        is_hidden: whether the position feed leaves the boat out.
+        feed_late_s: age of what the position feed says of the boat, s.
     """
 
     def __init__(
@@ -67,40 +67,8 @@ class Faults:
     ) -> None:
         self.autopilot, self.frame, self.random = autopilot, frame, random
         self._down, self._up = down, up
-        self._active: dict[str, Fault] = {}
-
-    @property
-    def is_dark(self) -> bool:
-        """Whether the autopilot is off."""
-        return any(fault.dark for fault in self._active.values())
-
-    @property
-    def is_hidden(self) -> bool:
-        """Whether the position feed leaves the boat out."""
-        return any(fault.hidden for fault in self._active.values())
-
-    @property
-    def feed_late_s(self) -> float:
-        """Age of what the position feed says of the boat, s."""
-        return max((fault.feed_late_s for fault in self._active.values()), default=0.0)
-
-    @property
-    def active(self) -> tuple[str, ...]:
-        """Kinds that act now."""
-        return tuple(self._active)
-
-    def misled(self, order: Order) -> Order:
-        """What the hull does under an order, the compass being what it is."""
-        off = sum(fault.compass_off_rad for fault in self._active.values())
-        if off == 0.0 or not isinstance(order, Steer):
-            return order
-        return Steer((order.heading_rad - off) % (2.0 * math.pi), order.speed_mps)
-
-    def sensed(self, truth: Snapshot, now_s: float) -> Snapshot:
-        """What the autopilot believes."""
-        for fault in self._active.values():
-            truth = truth if fault.change is None else fault.change(truth, now_s)
-        return truth
+        self.active: dict[str, Fault] = {}
+        self._combine()
 
     def start(self, kind: str, now_s: float, duration_s: float = math.inf, **options: Any) -> None:
         """Begin a fault, see `KINDS`.
@@ -110,28 +78,43 @@ class Faults:
         """
         check_kind(kind)
         try:
-            fault = KINDS[kind](self, now_s, **options)
+            fault = KINDS[kind](self, **options)
         except TypeError as error:
             raise ConfigError(f"fault {kind!r}: {error}") from None
         if fault is not None:
-            fault.ends_s = now_s + duration_s
-            self._active[kind] = fault
-            self._bend()
+            self.active[kind] = replace(fault, ends_s=now_s + duration_s)
+            self._combine()
 
     def stop(self, kind: str | None = None) -> None:
         """End a fault, or all."""
-        for name in list(self._active) if kind is None else [kind]:
-            self._active.pop(name, None)
-        self._bend()
+        for name in list(self.active) if kind is None else [kind]:
+            self.active.pop(name, None)
+        self._combine()
 
     def tick(self, now_s: float) -> None:
         """End those whose time is over."""
-        for name in [name for name, fault in self._active.items() if now_s >= fault.ends_s]:
+        for name in [name for name, fault in self.active.items() if now_s >= fault.ends_s]:
             self.stop(name)
 
-    def _bend(self) -> None:
-        self._down.bends = [fault.down for fault in self._active.values() if fault.down is not None]
-        self._up.bends = [fault.up for fault in self._active.values() if fault.up is not None]
+    def misled(self, order: Order) -> Order:
+        """What the hull does under an order, the compass being what it is."""
+        off = sum(fault.compass_off_rad for fault in self.active.values())
+        if off == 0.0 or not isinstance(order, Steer):
+            return order
+        return Steer((order.heading_rad - off) % (2.0 * math.pi), order.speed_mps)
+
+    def sensed(self, truth: Snapshot, now_s: float) -> Snapshot:
+        """What the autopilot believes."""
+        for fault in self.active.values():
+            truth = truth if fault.change is None else fault.change(truth, now_s)
+        return truth
+
+    def _combine(self) -> None:
+        faults = self.active.values()
+        self._down.bends = [fault.down for fault in faults if fault.down is not None]
+        self._up.bends = [fault.up for fault in faults if fault.up is not None]
+        self.is_dark, self.is_hidden = any(fault.dark for fault in faults), any(fault.hidden for fault in faults)
+        self.feed_late_s = max((fault.feed_late_s for fault in faults), default=0.0)
 
 
 def check_kind(kind: str) -> None:
@@ -150,105 +133,98 @@ def _drop(packet: bytes) -> list[tuple[float, bytes]]:
     return []
 
 
-def _telemetry_stop(boat: Faults, now_s: float) -> Fault:
+def _telemetry_stop(boat: Faults) -> Fault:
     """Nothing comes from the boat; it still obeys."""
     return Fault(down=_drop, hidden=True)
 
 
-def _commands_lost(boat: Faults, now_s: float) -> Fault:
+def _commands_lost(boat: Faults) -> Fault:
     """Nothing reaches the boat; it still tells."""
     return Fault(up=_drop)
 
 
-def _link_loss(boat: Faults, now_s: float) -> Fault:
+def _link_loss(boat: Faults) -> Fault:
     """Nothing comes from the boat, and nothing reaches it."""
     return Fault(down=_drop, up=_drop, hidden=True)
 
 
-def _freeze(boat: Faults, now_s: float) -> Fault:
+def _freeze(boat: Faults) -> Fault:
     """Position, speed and heading stay, time stamps go on."""
     kept = boat.autopilot.snapshot
-    return Fault(change=lambda truth, time_s: dataclasses.replace(kept, time_s=time_s))
+    return Fault(change=lambda truth, time_s: replace(kept, time_s=time_s))
 
 
-def _jump(boat: Faults, now_s: float, distance_m: float = 30.0, course_deg: float = 90.0) -> Fault:
+def _jump(boat: Faults, distance_m: float = 30.0, course_deg: float = 90.0) -> Fault:
     """The position it tells is `distance_m` (30) off along `course_deg` (90) of the field."""
     course = math.radians(course_deg)
     dx, dy = distance_m * math.sin(course), distance_m * math.cos(course)
     return Fault(change=lambda truth, time_s: truth.moved_to(boat.frame, truth.x_m + dx, truth.y_m + dy))
 
 
-def _gps_lost(boat: Faults, now_s: float) -> Fault:
+def _gps_lost(boat: Faults) -> Fault:
     """The fix is lost, and the autopilot says so; the position it tells goes on, reckoned from the last speed."""
     kept = boat.autopilot.snapshot
 
     def reckoned(truth: Snapshot, time_s: float) -> Snapshot:
         (vx, vy), past_s = kept.velocity_mps, time_s - kept.time_s
         place = truth.moved_to(boat.frame, kept.x_m + vx * past_s, kept.y_m + vy * past_s)
-        return dataclasses.replace(place, velocity_mps=(vx, vy), speed_mps=kept.speed_mps, has_fix=False)
+        return replace(place, velocity_mps=(vx, vy), speed_mps=kept.speed_mps, has_fix=False)
 
     return Fault(change=reckoned, hidden=True)
 
 
-def _compass(boat: Faults, now_s: float, offset_deg: float = 30.0) -> Fault:
+def _compass(boat: Faults, offset_deg: float = 30.0) -> Fault:
     """The heading it tells and steers by is `offset_deg` (30) off: it runs that much to the other side."""
-    offset = math.radians(offset_deg)
-    return Fault(
-        change=lambda truth, time_s: dataclasses.replace(truth, heading_rad=truth.heading_rad + offset),
-        compass_off_rad=offset,
-    )
+    off = math.radians(offset_deg)
+    return Fault(change=lambda truth, _: replace(truth, heading_rad=truth.heading_rad + off), compass_off_rad=off)
 
 
-def _late(boat: Faults, now_s: float, delay_s: float = 1.0) -> Fault:
+def _late(boat: Faults, delay_s: float = 1.0) -> Fault:
     """Every packet comes `delay_s` (1.0) later."""
     return Fault(down=lambda packet: [(delay_s, packet)], feed_late_s=delay_s)
 
 
-def _out_of_order(boat: Faults, now_s: float, spread_s: float = 0.3) -> Fault:
+def _out_of_order(boat: Faults, spread_s: float = 0.3) -> Fault:
     """Every packet comes up to `spread_s` (0.3) later, each its own."""
     return Fault(down=lambda packet: [(spread_s * boat.random.random(), packet)])
 
 
-def _duplicate(boat: Faults, now_s: float, copies: int = 2, spread_s: float = 0.2) -> Fault:
+def _duplicate(boat: Faults, copies: int = 2, spread_s: float = 0.2) -> Fault:
     """Every packet comes `copies` (2) times within `spread_s` (0.2)."""
-
-    def copied(packet: bytes) -> list[tuple[float, bytes]]:
-        return [(0.0, packet), *((spread_s * boat.random.random(), packet) for _ in range(copies - 1))]
-
-    return Fault(down=copied)
+    return Fault(
+        down=lambda packet: [(spread_s * boat.random.random() if k else 0.0, packet) for k in range(max(copies, 1))]
+    )
 
 
-def _corrupt(boat: Faults, now_s: float, share: float = 0.5) -> Fault:
+def _corrupt(boat: Faults, share: float = 0.5) -> Fault:
     """1 to 3 bits of a `share` (0.5) of packets are turned."""
 
     def damaged(packet: bytes) -> list[tuple[float, bytes]]:
-        if boat.random.random() >= share:
-            return [(0.0, packet)]
         data = bytearray(packet)
-        for _ in range(boat.random.integers(1, 4)):
+        for _ in range(boat.random.integers(1, 4) if boat.random.random() < share else 0):
             data[boat.random.integers(len(data))] ^= 1 << int(boat.random.integers(8))
         return [(0.0, bytes(data))]
 
     return Fault(down=damaged)
 
 
-def _restart(boat: Faults, now_s: float) -> None:
+def _restart(boat: Faults) -> None:
     """The autopilot boots again; parameters stay, modes and streams do not."""
     boat.autopilot.reboot_wanted = True
 
 
-def _power_off(boat: Faults, now_s: float) -> Fault:
+def _power_off(boat: Faults) -> Fault:
     """It is off until cleared."""
     boat.autopilot.reboot_wanted = True
     return Fault(down=_drop, up=_drop, dark=True, hidden=True)
 
 
-def _mode(boat: Faults, now_s: float, number: int = 4) -> None:
+def _mode(boat: Faults, number: int = 4) -> None:
     """A pilot's hand: mode `number` (4, HOLD), until he gives it back."""
-    boat.autopilot.vehicle.set_mode(number, now_s)
+    boat.autopilot.vehicle.set_mode(number, boat.autopilot.now_s)
 
 
-def _disarm(boat: Faults, now_s: float) -> None:
+def _disarm(boat: Faults) -> None:
     """A pilot's hand: motors off, until he arms it."""
     boat.autopilot.vehicle.armed = False
 
@@ -274,23 +250,15 @@ _FORM = re.compile(
 )
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclass(frozen=True)
 class Incident:
-    """One fault to come.
-
-    Attributes:
-        boat: its name.
-        kind: see `KINDS`.
-        at_s: simulated time, s.
-        lasts_s: s; inf: to the end.
-        options: of the fault.
-    """
+    """One fault to come: of which boat, its kind (see `KINDS`) and options, at what simulated time, for how long, s."""
 
     boat: str
     kind: str
     at_s: float
     lasts_s: float = math.inf
-    options: dict[str, Any] = dataclasses.field(default_factory=dict)
+    options: dict[str, Any] = field(default_factory=dict)
 
 
 def parse_incident(text: str) -> Incident:
@@ -314,10 +282,6 @@ def parse_incident(text: str) -> Incident:
 
 class Plan:
     """Faults to come, in order of time.
-
-    Args:
-        incidents: all of them.
-        fleet: the boats.
 
     Raises:
         ConfigError: a boat that is not simulated.

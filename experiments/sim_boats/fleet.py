@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import logging
-import selectors
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
+from multiprocessing.connection import wait
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -25,7 +25,6 @@ from steerclear.shield.compat import Self
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import Platform
-from steerclear.shield.platforms import layout as L
 
 from .boat import Boat, Setting
 from .game import Game, game_of, playing, start_places
@@ -58,43 +57,22 @@ def boats_of(fleet: FleetFile, opponents: str, hulls: Hulls | None = None) -> li
     """
     boats = []
     for i, boat in enumerate(fleet.boats):
-        platform = fleet.platform_of[boat.name]
-        ours = fleet.team_of[boat.name] == fleet.team_number
-        commanded = boat.link is not None and boat.commanded and ours
+        name, link, platform, plays = boat.name, boat.link, fleet.platform_of[boat.name], boat.agent is not None
+        ours = link is not None and boat.commanded and fleet.team_of[name] == fleet.team_number
         beside = (fleet.geofence.xmin_m + 2.0 + _APART_M * i, fleet.geofence.ymin_m + 2.0, 90.0)
         boats.append(
             SimBoat(
-                name=boat.name,
-                platform=platform if hulls is None else hulls(boat.name, platform),
-                team=fleet.team_of[boat.name],
-                system_id=0 if boat.link is None else boat.link.system_id,
-                address=None if boat.link is None else boat.link.address,
-                policy=opponents if boat.agent is not None and not commanded else "",
-                start=None if boat.agent is not None else beside,
-                gate=boat.link.gate if isinstance(boat.link, MoosLinkSettings) else "helm",
+                name=name,
+                platform=platform if hulls is None else hulls(name, platform),
+                team=fleet.team_of[name],
+                system_id=0 if link is None else link.system_id,
+                address=None if link is None else link.address,
+                policy=opponents if plays and not ours else "",
+                start=None if plays else beside,
+                gate=link.gate if isinstance(link, MoosLinkSettings) else "helm",
             )
         )
     return boats
-
-
-def settings_of(fleet: FleetFile) -> dict[str, Any]:
-    """What a file says of a `SimFleet`'s settings.
-
-    Raises:
-        FleetFileError: the game's rules cannot be used.
-        ConfigError: the signing key cannot be read, or others can read it.
-    """
-    origin = fleet.field.origin
-    settings: dict[str, Any] = {
-        "origin": (origin.latitude_deg, origin.longitude_deg),
-        "y_axis_deg": fleet.field.y_axis_deg,
-        "feed_to": fleet.position_listeners(),
-        "separation_m": fleet.shield_config.separation_m,
-        "key": key_of(fleet),
-    }
-    if fleet.agent_ids:
-        settings["preset"] = game_config(fleet).replace(dt_s=STEP_S)
-    return settings
 
 
 class SimFleet:
@@ -162,43 +140,34 @@ class SimFleet:
         if not 0.0 <= noise <= 100.0:
             raise ConfigError(f"noise is {noise}; give 0 for none, 1 as measured, at most 100")
         self.frame = FieldFrame(*origin, y_axis_deg)
-        self._lock = threading.RLock()
-        self._ticks = 0
-        self._hub: PositionHub | None = None
-        self._ports = Ports(allow_remote)
         self.clock: Clock = MonotonicClock(speed) if clock is None else clock
         self.let_go_s = self.cpu_s = 0.0
+        self._lock, self._ends, self._ticks = threading.RLock(), threading.Event(), 0
         self._thread: threading.Thread | None = None
-        self._ends = threading.Event()
+        self.boats: dict[str, Boat] = {}
+        self._ports = Ports(allow_remote)
+        self._hub: PositionHub | None = None
+        config = game_of(boats, preset, rules or {})
         parts = (autopilot or AutopilotSettings(), radio or RadioSettings())
         setting = Setting(self.frame, *parts, noise, key, float(getattr(self.clock, "speed", 1.0)))
-        config = game_of(boats, preset, rules or {})
         try:
-            self.boats = self._built(boats, config, setting, seed, random_start)
-            listeners = [near(to, allow_remote) for to in feed_to]
-            self._hub = PositionHub(listeners, self.frame, noise, key) if feed_to else None
+            places = start_places(boats, config, seed if random_start else None)
+            seeds = np.random.SeedSequence(seed).spawn(len(boats))
+            for i, (spec, place) in enumerate(zip(boats, places, strict=True)):
+                self.boats[spec.name] = boat = Boat(spec, place, spec.system_id or i + 1, setting, seeds[i])
+                self._ports.plug_in(boat)
+            if feed_to:
+                self._hub = PositionHub([near(to, allow_remote) for to in feed_to], self.frame, noise, key)
             everyone = list(self.boats.values())
             players = [everyone[i] for i in playing(boats)]
             driven = {i: boat.spec.policy for i, boat in enumerate(players) if boat.spec.policy}
             game = None if config is None else Game(config, driven, seed)
             weather = Weather(water or Water(), self.frame, np.random.default_rng([seed, 0x9057]))
-            self._world = World(everyone, weather, game, players, self._hub, waits)
+            radius_m = separation_m if record else None
+            self._world = World(everyone, weather, game, players, self._hub, waits, radius_m)
         except BaseException:
             self.close()
             raise
-        self._world.record_radius_m = separation_m if record else None
-
-    def _built(
-        self, boats: Sequence[SimBoat], config: GameConfig | None, setting: Setting, seed: int, random_start: bool
-    ) -> dict[str, Boat]:
-        """Boats at their start, plugged in, by name."""
-        places = start_places(boats, config, seed if random_start else None)
-        seeds = np.random.SeedSequence(seed).spawn(len(boats))
-        built = {}
-        for i, (spec, place) in enumerate(zip(boats, places, strict=True)):
-            built[spec.name] = boat = Boat(spec, place, spec.system_id or i + 1, setting, seeds[i])
-            self._ports.plug_in(boat)
-        return built
 
     @classmethod
     def from_file(
@@ -217,7 +186,17 @@ class SimFleet:
             ConfigError: a setting cannot be used.
         """
         file = fleet if isinstance(fleet, FleetFile) else load_fleet(fleet)
-        return cls(boats_of(file, opponents, hulls), **{**settings_of(file), **settings})
+        origin = file.field.origin
+        said: dict[str, Any] = {
+            "origin": (origin.latitude_deg, origin.longitude_deg),
+            "y_axis_deg": file.field.y_axis_deg,
+            "feed_to": file.position_listeners(),
+            "separation_m": file.shield_config.separation_m,
+            "key": key_of(file),
+        }
+        if file.agent_ids:
+            said["preset"] = game_config(file).replace(dt_s=STEP_S)
+        return cls(boats_of(file, opponents, hulls), **{**said, **settings})
 
     @property
     def addresses(self) -> dict[str, str]:
@@ -266,10 +245,7 @@ class SimFleet:
             ConfigError: no such boat.
         """
         with self._lock:
-            hull = self.boat(boat).hull
-            hull.forget()
-            hull.astern = False
-            hull.state[[L.X, L.Y, L.HEADING, L.SPEED]] = x_m, y_m, heading_deg, speed_mps
+            self.boat(boat).hull.place(x_m, y_m, heading_deg, speed_mps)
 
     def fault(self, boat: str, kind: str, *, duration_s: float = float("inf"), **options: Any) -> None:
         """Begin a fault of a boat, see `faults.KINDS`; `clear` ends it.
@@ -304,7 +280,7 @@ class SimFleet:
             return record_of(self._world.truth).record()
 
     def judge(self, team: int = 0) -> list[dict[str, Any]]:
-        """Breaches of a team since the game began, with the oracle's verdicts (`docs_keys.BREACH`).
+        """Separation violations of a team since the game began, with verdicts (`docs_keys.BREACH`).
 
         Raises:
             ConfigError: nothing was recorded.
@@ -344,6 +320,9 @@ class SimFleet:
             self._thread.join()
             self._thread = None
         self._ports.close()
+        for boat in self.boats.values():
+            if boat.community is not None:
+                boat.community.close()
         if self._hub is not None:
             self._hub.close()
 
@@ -388,11 +367,8 @@ class SimFleet:
         """Wait until then or until there is something to read, and read it."""
         left_s = (due_s - self.clock.now_s()) / getattr(self.clock, "speed", 1.0)
         patience_s = min(max(left_s, 0.0), _LONGEST_WAIT_S)
-        with selectors.DefaultSelector() as selector:
-            for number in self._ports.sockets():
-                selector.register(number, selectors.EVENT_READ)
-            if selector.select(patience_s):
-                self._receive(self.clock.now_s() - due_s + TICK_S)
+        if wait(self._ports.sockets(), patience_s):
+            self._receive(self.clock.now_s() - due_s + TICK_S)
 
     def _receive(self, since_tick_s: float) -> None:
         with self._lock:
@@ -406,6 +382,5 @@ class SimFleet:
             for boat in self.boats.values():
                 boat.tick(self.time_s)
                 if boat.community is not None:
-                    boat.community.report(
-                        [(name, other.spec.team, other.seen) for name, other in self.boats.items()], self.time_s
-                    )
+                    seen = [(name, other.spec.team, other.seen) for name, other in self.boats.items()]
+                    boat.community.report(seen, self.time_s)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -22,13 +23,12 @@ from .settings import SimBoat
 
 Place = tuple[float, float, float]
 """x m, y m, heading deg."""
-_BLUE, _RED = 0, 1
+_SEEN = (L.X, L.Y, L.HEADING, L.SPEED)
 
 
 def playing(boats: Sequence[SimBoat]) -> list[int]:
     """Numbers of the boats that play, blue first; none when the teams are not of one size."""
-    blue = [i for i, boat in enumerate(boats) if boat.team == _BLUE]
-    red = [i for i, boat in enumerate(boats) if boat.team == _RED]
+    blue, red = ([i for i, boat in enumerate(boats) if boat.team == team] for team in (0, 1))
     return [*blue, *red] if len(blue) == len(red) else []
 
 
@@ -61,83 +61,62 @@ def start_places(boats: Sequence[SimBoat], config: GameConfig | None, random_see
     Raises:
         ConfigError: there is no room for random places, or a boat outside the game has no place of its own.
     """
-    largest = max(1, *(sum(boat.team == team for boat in boats) for team in (_BLUE, _RED)))
+    largest = max(1, *(sum(boat.team == team for boat in boats) for team in (0, 1)))
     game = config or GameConfig.preset("aamas2024", team_size=largest)
-    free = _fixed(game) if random_seed is None else _random(game, random_seed)
-    waiting = {_BLUE: free[: game.team_size], _RED: free[game.team_size :]}
-    return [_next(waiting, boat) for boat in boats]
-
-
-def _next(waiting: dict[int, list[Place]], boat: SimBoat) -> Place:
-    places = waiting.get(boat.team, [])
-    place = places.pop(0) if places else None
-    if boat.start is None and place is None:
-        raise ConfigError(f"boat {boat.name!r} is in no team; give it a start (x m, y m, heading deg)")
-    return boat.start or place  # type: ignore[return-value]  # one of them is there
-
-
-def _fixed(game: GameConfig) -> list[Place]:
-    core = BatchedMctf(game.replace(default_start=True))
-    return [(float(row[L.X]), float(row[L.Y]), float(row[L.HEADING])) for row in core.state[0]]
-
-
-def _random(game: GameConfig, seed: int) -> list[Place]:
-    start = opening(game, seed)
-    pairs = zip(start["agent_position"], start["agent_heading"], strict=True)
-    return [(float(x), float(y), float(heading)) for (x, y), heading in pairs]
-
-
-_SEEN = (L.X, L.Y, L.HEADING, L.SPEED)
+    if random_seed is None:
+        rows = BatchedMctf(game.replace(default_start=True)).state[0][:, [L.X, L.Y, L.HEADING]]
+    else:
+        start = opening(game, random_seed)
+        rows = np.column_stack([start["agent_position"], start["agent_heading"]])
+    free = iter(rows[: game.team_size].tolist()), iter(rows[game.team_size :].tolist())
+    places = []
+    for boat in boats:
+        own = next(free[boat.team], None) if boat.team in (0, 1) else None  # whoever lies elsewhere leaves it free
+        x_m, y_m, heading_deg = boat.start or own or (math.nan,) * 3
+        if math.isnan(x_m):
+            raise ConfigError(f"boat {boat.name!r} is in no team; give it a start (x m, y m, heading deg)")
+        places.append((x_m, y_m, heading_deg))
+    return places
 
 
 class Game:
-    """Rules and scripted players over boats that something else moves.
-
-    Args:
-        config: the game; its boats are blue first.
-        players: scripted policy of each boat that has one, by number.
-        seed: of the policies.
+    """Rules and scripted players (``players``: number to policy) over boats that something else moves, blue first.
 
     Raises:
         ConfigError: a policy is not a scripted one.
     """
 
     def __init__(self, config: GameConfig, players: Mapping[int, str], seed: int) -> None:
-        self.env = MctfEnv(config)
+        self.env, self.players, self._seed = MctfEnv(config), dict(players), seed
         self.core = self.env.core
-        self.players = dict(players)
-        self._seed = seed
-        self._seats: list[PolicyRunner] = []
+        self._runners: list[PolicyRunner] = []
         for name in dict.fromkeys(players.values()):
             if name not in ENTRIES:
                 raise ConfigError(f"simulated boats play scripted policies only, not {name!r}: {', '.join(ENTRIES)}")
             for team in (0, 1):
-                boats = [i for i, other in players.items() if other == name and self.core.team[i] == team]
-                if boats:
-                    ids = [config.agent_ids[i] for i in boats]
-                    self._seats.append(PolicyRunner(policies.make(name), self.env, ids))
+                ids = [config.agent_ids[i] for i in players if players[i] == name and self.core.team[i] == team]
+                if ids:
+                    self._runners.append(PolicyRunner(policies.make(name), self.env, ids))
 
-    def start(self, states: Sequence[Array]) -> None:
-        """Begin with the boats where they are, (N_STATE,) each."""
-        rows = np.array(states)
-        self.core.start_seen(rows[None, :, _SEEN])
-        self.core.state[0] = rows
-        for number, seat in enumerate(self._seats):
-            seat.reset(self.env, 2 * self._seed + number)
+    def start(self, states: Array) -> None:
+        """Begin with the boats where they are, (n, N_STATE)."""
+        self.core.start_seen(states[None, :, _SEEN])
+        self.core.state[0] = states
+        for number, runner in enumerate(self._runners):
+            runner.reset(self.env, 2 * self._seed + number)
 
     def orders(self) -> dict[int, Bear]:
         """What the scripted players' boats do next, driven home where the game does that."""
-        if not self._seats:
+        if not self._runners:
             return {}
-        wanted = np.zeros((1, self.core.n_boats, 2))
-        for seat in self._seats:
-            for agent_id, action in seat.act({}, {}).items():
-                wanted[0, self.env.possible_agents.index(agent_id)] = action
-        decided = self.core.commands(wanted)[0]
+        nominal = np.zeros((1, self.core.n_boats, 2))
+        for runner in self._runners:
+            for agent_id, action in runner.act({}, {}).items():
+                nominal[0, self.env.possible_agents.index(agent_id)] = action
+        decided = self.core.commands(nominal)[0]
         return {i: Bear(float(decided[i, 1]), float(decided[i, 0])) for i in self.players}
 
-    def follow(self, states: Sequence[Array]) -> None:
+    def follow(self, states: Array) -> None:
         """The boats have moved by one step: apply the rules."""
-        rows = np.array(states)
-        self.core.follow(rows[None, :, _SEEN], STEP_S)
-        self.core.state[0] = rows  # with the autopilots' memory, which the rules do not need and the oracle does
+        self.core.follow(states[None, :, _SEEN], STEP_S)
+        self.core.state[0] = states  # with the autopilots' memory, which the rules do not need and the judge does

@@ -8,8 +8,7 @@ from collections.abc import Iterable
 
 from steerclear.shield.bridge.fleet_checks import MOOS, address_of
 from steerclear.shield.bridge.frame import FieldFrame
-from steerclear.shield.bridge.moos.stand_in_db import StandInDb
-from steerclear.shield.bridge.moos.stand_in_pid import StandInActuators, StandInPid
+from steerclear.shield.bridge.moos.stand_in import StandInActuators, StandInDb, StandInPid
 from steerclear.shield.bridge.moos.wire import Message
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import Platform
@@ -20,7 +19,7 @@ from .sensing import Snapshot
 SIMULATOR, PID, REPORTER, RELAY = "uSimMarine", "pMarinePID", "pNodeReporter", "uFldNodeComms"
 REPORT_S, NAV_S = 0.5, 0.1
 """Between NODE_REPORTs, and between NAV_*, simulated s."""
-LOOPBACK = ("127.0.0.1", "localhost")
+LOOPBACK = "127.0.0.1"
 
 
 class Community:
@@ -40,8 +39,8 @@ class Community:
 
     def __init__(self, boat: str, address: str, frame: FieldFrame, warp: float, precbf: Platform | None = None) -> None:
         host, port = address_of(address.removeprefix(MOOS), f"boat {boat!r}: link")
-        if host not in LOOPBACK:
-            raise ConfigError(f"{address!r} is not on this machine; a stand-in MOOSDB is on 127.0.0.1 only")
+        if host not in (LOOPBACK, "localhost"):
+            raise ConfigError(f"{address!r} is not on this machine; a stand-in MOOSDB is on {LOOPBACK} only")
         self._boat, self._frame, self.pid = boat, frame, StandInPid()
         self.actuators = None if precbf is None else StandInActuators(precbf, STEP_S)
         self._seen: Snapshot | None = None

@@ -9,14 +9,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from steerclear.shield.bridge.frame import FieldFrame
-from steerclear.shield.platforms import layout as L
 
-from .hull import Hull
+from .hull import STEP_S, Hull
 from .settings import RadioSettings
 
-_POSITION_M, _POSITION_MEMORY_S = 0.06, 10.0
-_VELOCITY_MPS, _VELOCITY_MEMORY_S = 0.035, 1.0
-_HEADING_DEG_RUNNING, _HEADING_DEG_AT_REST, _HEADING_MEMORY_S = 0.3, 1.7, 3.0
+_HEADING_RUNNING_RAD, _HEADING_AT_REST_RAD = math.radians(0.3), math.radians(1.7)
+_SPREAD = np.array([0.06, 0.06, 0.035, 0.035])
+"""Of x, y m and their rates m/s; the heading's depends on the speed."""
+_KEPT = np.exp(-STEP_S / np.array([10.0, 10.0, 1.0, 1.0, 3.0]))
+"""Errors wander: each forgets itself over its own time."""
 _TURN_RATE_RADS = 0.003
 
 
@@ -53,24 +54,15 @@ class Snapshot:
 
 
 class Sensors:
-    """GPS, compass and gyro of one boat.
-
-    Args:
-        frame: where the field is.
-        noise: 0 none, 1 as measured.
-        random: its random numbers.
-    """
+    """GPS, compass and gyro of one boat; noise: 0 none, 1 as measured."""
 
     def __init__(self, frame: FieldFrame, noise: float, random: np.random.Generator) -> None:
-        self._frame = frame
-        self._noise = noise
-        self._random = random
+        self._frame, self._noise, self._random = frame, noise, random
         self._errors = random.standard_normal(5)
 
     def sense(self, hull: Hull, time_s: float) -> Snapshot:
         """What they say of the hull now."""
-        x, y = float(hull.state[L.X]), float(hull.state[L.Y])
-        velocity, heading, rate = hull.velocity_mps, hull.heading_rad, hull.turn_rate_rads
+        (x, y), velocity, heading, rate = hull.position_m, hull.velocity_mps, hull.heading_rad, hull.turn_rate_rads
         if self._noise > 0.0:
             dx, dy, dvx, dvy, turn = self._drawn(hull)
             x, y, heading = x + dx, y + dy, heading + turn
@@ -81,14 +73,10 @@ class Sensors:
         return Snapshot(time_s, x, y, latitude, longitude, velocity, heading, along, rate)
 
     def _drawn(self, hull: Hull) -> tuple[float, ...]:
-        """Errors that wander: each forgets itself over its own time."""
-        memory = np.array([_POSITION_MEMORY_S] * 2 + [_VELOCITY_MEMORY_S] * 2 + [_HEADING_MEMORY_S])
-        kept = np.exp(-hull.dt_s / memory)
-        self._errors = kept * self._errors + np.sqrt(1.0 - kept**2) * self._random.standard_normal(5)
+        self._errors = _KEPT * self._errors + np.sqrt(1.0 - _KEPT**2) * self._random.standard_normal(5)
         running = min(abs(hull.speed_mps), 1.0)
-        heading = math.radians(_HEADING_DEG_AT_REST + running * (_HEADING_DEG_RUNNING - _HEADING_DEG_AT_REST))
-        size = np.array([_POSITION_M, _POSITION_M, _VELOCITY_MPS, _VELOCITY_MPS, heading])
-        return tuple((self._noise * size * self._errors).tolist())
+        heading = _HEADING_AT_REST_RAD + running * (_HEADING_RUNNING_RAD - _HEADING_AT_REST_RAD)
+        return tuple((self._noise * np.append(_SPREAD, heading) * self._errors).tolist())
 
 
 Bend = Callable[[bytes], list[tuple[float, bytes]]]
@@ -96,20 +84,10 @@ Bend = Callable[[bytes], list[tuple[float, bytes]]]
 
 
 class Radio:
-    """Holds packets until they arrive.
-
-    Args:
-        settings: what happens to every packet.
-        random: its random numbers.
-
-    Attributes:
-        bends: faults that act now, in order.
-        lost: packets dropped so far.
-    """
+    """Holds packets until they arrive; ``bends``: faults that act now, in order; ``lost``: packets dropped so far."""
 
     def __init__(self, settings: RadioSettings, random: np.random.Generator) -> None:
-        self._settings = settings
-        self._random = random
+        self._settings, self._random = settings, random
         self._waiting: list[tuple[float, int, bytes]] = []
         self._number = 0
         self.bends: list[Bend] = []
@@ -117,19 +95,15 @@ class Radio:
 
     def put(self, packet: bytes, now_s: float) -> None:
         """A packet leaves."""
-        if self._settings.loss > 0.0 and self._random.random() < self._settings.loss:
-            self.lost += 1
-            return
-        copies = [(0.0, packet)]
+        lost = self._settings.loss > 0.0 and self._random.random() < self._settings.loss
+        copies = [] if lost else [(0.0, packet)]
         for bend in self.bends:
             copies = [(late + more, bent) for late, data in copies for more, bent in bend(data)]
         self.lost += not copies
         for late, data in copies:
-            delay = self._settings.delay_s + late
-            if self._settings.jitter_s > 0.0:
-                delay += self._settings.jitter_s * self._random.random()
+            jitter_s = self._settings.jitter_s * self._random.random() if self._settings.jitter_s > 0.0 else 0.0
             self._number += 1
-            heapq.heappush(self._waiting, (now_s + delay, self._number, data))
+            heapq.heappush(self._waiting, (now_s + self._settings.delay_s + late + jitter_s, self._number, data))
 
     def take(self, now_s: float) -> Iterator[bytes]:
         """Packets that have arrived by now."""

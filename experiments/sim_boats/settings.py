@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import Platform
 
 FREE = ""
 """Address of a boat that chooses a free port itself."""
+_MOST = 1e9
 
 
-def check_numbers(settings: object, names: tuple[str, ...], low: float = 0.0, high: float = math.inf) -> None:
-    """Raise unless these attributes are finite numbers within [low, high].
+def check_bounds(settings: object, **bounds: tuple[float, float]) -> None:
+    """Raise unless these attributes are numbers within their bounds.
 
     Raises:
         ConfigError: one of them is not.
     """
-    for name in names:
+    for name, (low, high) in bounds.items():
         value = getattr(settings, name)
-        fine = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-        if not (fine and low <= value <= high):
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
             raise ConfigError(f"{name} is {value!r}; give a number within {low:g} and {high:g}")
 
 
@@ -56,7 +55,7 @@ class SimBoat:
 
 @dataclass(frozen=True)
 class Firmware:
-    """What differs between autopilot versions.
+    """What differs between autopilot versions; the defaults are the one that was measured.
 
     Attributes:
         version: major, minor, patch.
@@ -70,9 +69,6 @@ class Firmware:
     yaw_speed_command: bool = True
     timeout_parameter: bool = False
 
-
-MEASURED_FIRMWARE = Firmware()
-"""The one that was measured."""
 
 LATER_FIRMWARE = Firmware((4, 8, 0), yaw_trap=False, yaw_speed_command=False, timeout_parameter=True)
 """One from mid-2026 on."""
@@ -101,14 +97,13 @@ class AutopilotSettings:
     brake_mps2: float | None = 1.2
     back_up_m: float = 2.0
     top_rate_hz: float = 40.0
-    firmware: Firmware = MEASURED_FIRMWARE
+    firmware: Firmware = Firmware()
     parameters: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        check_numbers(self, ("boot_s", "back_up_m"))
-        check_numbers(self, ("timeout_s", "top_rate_hz"), low=0.01)
-        if self.brake_mps2 is not None:
-            check_numbers(self, ("brake_mps2",), low=0.01)
+        positive = {} if self.brake_mps2 is None else {"brake_mps2": (0.01, _MOST)}
+        check_bounds(self, boot_s=(0.0, _MOST), back_up_m=(0.0, _MOST), timeout_s=(0.01, _MOST), **positive)
+        check_bounds(self, top_rate_hz=(0.01, _MOST))
 
 
 @dataclass(frozen=True)
@@ -133,9 +128,8 @@ class Water:
     current_to_deg: float = 0.0
 
     def __post_init__(self) -> None:
-        check_numbers(self, ("wind_mps", "current_mps"), high=60.0)
-        check_numbers(self, ("gust_share", "leeway_share"), high=1.0)
-        check_numbers(self, ("wind_from_deg", "current_to_deg"), low=-360.0, high=360.0)
+        check_bounds(self, wind_mps=(0.0, 60.0), wind_from_deg=(-360.0, 360.0), gust_share=(0.0, 1.0))
+        check_bounds(self, leeway_share=(0.0, 1.0), current_mps=(0.0, 60.0), current_to_deg=(-360.0, 360.0))
 
     @property
     def is_still(self) -> bool:
@@ -161,5 +155,4 @@ class RadioSettings:
     jitter_s: float = 0.0
 
     def __post_init__(self) -> None:
-        check_numbers(self, ("loss",), high=1.0)
-        check_numbers(self, tuple(entry.name for entry in fields(self))[1:], high=60.0)
+        check_bounds(self, loss=(0.0, 1.0), delay_s=(0.0, 60.0), jitter_s=(0.0, 60.0))

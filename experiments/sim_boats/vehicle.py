@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 import math
 from collections import deque
-from collections.abc import Mapping
 from enum import IntEnum
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -29,162 +28,113 @@ class Mode(IntEnum):
     GUIDED = 15
 
 
-NEEDS_POSITION = frozenset({Mode.LOITER, Mode.AUTO, Mode.RTL, Mode.SMART_RTL, Mode.GUIDED})
+NEEDS_POSITION = frozenset({Mode.LOITER, Mode.GUIDED})
 """Modes that cannot be entered before the position is known."""
-
 NOT_OFFERED = frozenset({Mode.AUTO, Mode.RTL, Mode.SMART_RTL})
 """Modes that need a mission or a path back, which these boats do not have."""
 
-
-_REAL32, _INT8, _INT16, _INT32 = 9, 2, 4, 6
-
-_DEFAULTS: dict[str, tuple[float, int]] = {
+REAL32, _INT8, _INT16, _INT32 = 9, 2, 4, 6
+PARAMETERS: dict[str, tuple[float, int]] = {
     "SYSID_THISMAV": (1.0, _INT16),
     "SYSID_MYGCS": (255.0, _INT16),
     "ARMING_CHECK": (1.0, _INT32),
-    "CRUISE_SPEED": (2.0, _REAL32),
+    "CRUISE_SPEED": (2.0, REAL32),
     "FRAME_CLASS": (2.0, _INT8),
     "AVOID_ENABLE": (3.0, _INT8),
     "FENCE_ACTION": (2.0, _INT8),
     "FENCE_ENABLE": (0.0, _INT8),
     "FS_ACTION": (2.0, _INT8),
     "FS_GCS_ENABLE": (0.0, _INT8),
-    "FS_GCS_TIMEOUT": (5.0, _REAL32),
-    "FS_TIMEOUT": (1.5, _REAL32),
+    "FS_GCS_TIMEOUT": (5.0, REAL32),
+    "FS_TIMEOUT": (1.5, REAL32),
+    "GUID_TIMEOUT": (3.0, REAL32),
     "INITIAL_MODE": (0.0, _INT8),
-    "LOIT_RADIUS": (2.0, _REAL32),
+    "LOIT_RADIUS": (2.0, REAL32),
     "OA_TYPE": (0.0, _INT8),
-    "WP_SPEED": (2.0, _REAL32),
+    "WP_SPEED": (2.0, REAL32),
 }
-
-
-class Parameters:
-    """Values by name; types never change.
-
-    Args:
-        given: values that differ from the defaults.
-        has_timeout: whether GUID_TIMEOUT exists.
-
-    Raises:
-        ConfigError: a name the autopilot does not have.
-    """
-
-    def __init__(self, given: Mapping[str, float], has_timeout: bool = False) -> None:
-        table = dict(_DEFAULTS)
-        if has_timeout:
-            table["GUID_TIMEOUT"] = (3.0, _REAL32)
-        self._values = {name: value for name, (value, _) in table.items()}
-        self._types = {name: kind for name, (_, kind) in table.items()}
-        for name, value in given.items():
-            if name not in self._values:
-                near = difflib.get_close_matches(name, self._values, n=1)
-                hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(self._values)}"
-                raise ConfigError(f"the simulated autopilot has no parameter {name!r}; {hint}")
-            self._values[name] = float(value)
-        self.names = sorted(self._values)
-
-    def __contains__(self, name: str) -> bool:
-        return name in self._values
-
-    def __getitem__(self, name: str) -> float:
-        return self._values[name]
-
-    def get(self, name: str, default: float) -> float:
-        """Value of a parameter, or the default where it does not exist."""
-        return self._values.get(name, default)
-
-    def set(self, name: str, value: float) -> bool:
-        """Set a known parameter, integers rounded; False when there is none of that name."""
-        if name not in self._values:
-            return False
-        self._values[name] = float(value) if self._types[name] == _REAL32 else float(round(value))
-        return True
-
-    def type_of(self, name: str) -> int:
-        """MAV_PARAM_TYPE of a parameter."""
-        return self._types[name]
-
+"""Defaults and MAV_PARAM_TYPEs; GUID_TIMEOUT only where the firmware has it."""
 
 WARNING, CRITICAL, INFO = 4, 2, 6
 """Severities of texts."""
-
-_BOOT_S = 42.0
-_POSITION_SHARE = 9.0 / _BOOT_S
-_ATTITUDE_SHARE = 1.0 / _BOOT_S
-
 NO_ARMING = "Arm: AHRS: not using configured AHRS type"
+_POSITION_SHARE, _ATTITUDE_SHARE = 9.0 / 42.0, 1.0 / 42.0
+"""Of the time from power on to arming, as measured."""
 
 
 class Vehicle:
     """One boat's autopilot from power on.
 
+    Args:
+        settings: how it behaves.
+
     Attributes:
-        parameters: kept over a restart, as on a real boat.
+        parameters: values by name; kept over a restart, as on a real boat.
         mode, armed: present ones.
         texts: (severity, text) not yet sent.
         target: what the commander asked for; None when there is none or it timed out.
+
+    Raises:
+        ConfigError: a parameter it does not have.
     """
 
-    def __init__(self, settings: AutopilotSettings, parameters: Parameters) -> None:
+    def __init__(self, settings: AutopilotSettings) -> None:
         self.settings = settings
-        self.parameters = parameters
+        known = [name for name in PARAMETERS if name != "GUID_TIMEOUT" or settings.firmware.timeout_parameter]
+        self.parameters = {name: PARAMETERS[name][0] for name in sorted(known)}
+        for name, value in settings.parameters.items():
+            if name not in self.parameters:
+                near = difflib.get_close_matches(name, self.parameters, n=1)
+                hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(self.parameters)}"
+                raise ConfigError(f"the simulated autopilot has no parameter {name!r}; {hint}")
+            self.parameters[name] = float(value)
         self.texts: deque[tuple[int, str]] = deque(maxlen=100)
         self.boot(0.0)
 
     def boot(self, now_s: float) -> None:
         """Start, or start again: everything but the parameters is forgotten."""
-        self.booted_s = now_s
-        self.armed = False
+        self.booted_s, self.armed = now_s, False
         self.mode = Mode(int(self.parameters["INITIAL_MODE"]))
         self.target: Steer | Turn | None = None
-        self._target_s = -math.inf
-        self._timed_out = False
-        self._gcs_s = math.inf
+        self._target_s, self._ground_s, self._timed_out = -math.inf, math.inf, False
         self.texts.clear()
-        self.say(INFO, "ArduPilot Ready")
+        self.texts.append((INFO, "ArduPilot Ready"))
 
-    def say(self, severity: int, text: str) -> None:
-        """Queue a text for the ground."""
-        self.texts.append((severity, text))
-
-    def uptime_s(self, now_s: float) -> float:
-        """Since power on, s."""
-        return now_s - self.booted_s
+    def set_parameter(self, name: str, value: float) -> bool:
+        """Set a known parameter, integers rounded; False for what cannot be set."""
+        if name not in self.parameters or not math.isfinite(value):
+            return False
+        self.parameters[name] = float(value if PARAMETERS[name][1] == REAL32 else round(value))
+        return True
 
     def has_position(self, now_s: float) -> bool:
         """Whether it knows where it is."""
-        return self.uptime_s(now_s) >= self.settings.boot_s * _POSITION_SHARE
+        return now_s - self.booted_s >= self.settings.boot_s * _POSITION_SHARE
 
     def has_attitude(self, now_s: float) -> bool:
         """Whether its attitude is to be believed."""
-        return self.uptime_s(now_s) >= self.settings.boot_s * _ATTITUDE_SHARE
-
-    def can_arm(self, now_s: float) -> bool:
-        """Whether all checks pass."""
-        return self.uptime_s(now_s) >= self.settings.boot_s
+        return now_s - self.booted_s >= self.settings.boot_s * _ATTITUDE_SHARE
 
     def arm(self, now_s: float, force: bool = False) -> bool:
         """Arm; refusals are explained in a text."""
-        checks = self.parameters["ARMING_CHECK"] != 0.0 and not force
-        if not self.armed and checks and not self.can_arm(now_s):
-            self.say(CRITICAL, NO_ARMING)
-            return False
-        self.armed = True
-        return True
+        skips = force or self.parameters["ARMING_CHECK"] == 0.0
+        self.armed = self.armed or skips or now_s - self.booted_s >= self.settings.boot_s
+        if not self.armed:
+            self.texts.append((CRITICAL, NO_ARMING))
+        return self.armed
 
     def set_mode(self, number: int, now_s: float) -> bool:
         """Change mode; refusals are explained in a text."""
         if number not in list(Mode):
-            self.say(WARNING, f"No such mode {number}")
+            self.texts.append((WARNING, f"No such mode {number}"))
             return False
         mode = Mode(number)
         if mode == self.mode:
             return True
         if mode in NOT_OFFERED or (mode in NEEDS_POSITION and not self.has_position(now_s)):
-            self.say(WARNING, "Flight mode change failed")
+            self.texts.append((WARNING, "Flight mode change failed"))
             return False
-        self.mode = mode
-        self.target, self._timed_out = None, False
+        self.mode, self.target, self._timed_out = mode, None, False
         return True
 
     def take(self, target: Steer | Turn, now_s: float) -> bool:
@@ -196,18 +146,18 @@ class Vehicle:
 
     def hear_ground(self, now_s: float) -> None:
         """A heartbeat of the ground station came."""
-        self._gcs_s = now_s
+        self._ground_s = now_s
 
     def tick(self, now_s: float) -> None:
         """Look at the clocks: targets that grew old, ground stations gone silent."""
-        limit = self._timeout_s()
+        limit = self.parameters.get("GUID_TIMEOUT", self.settings.timeout_s)
         if self.target is not None and now_s - self._target_s > limit:
-            self.say(WARNING, f"target not received last {limit:g}secs, stopping")
+            self.texts.append((WARNING, f"target not received last {limit:g}secs, stopping"))
             self.target, self._timed_out = None, True
         patience = self.parameters["FS_GCS_TIMEOUT"] + self.parameters["FS_TIMEOUT"]
         watched = self.parameters["FS_GCS_ENABLE"] != 0.0 and self.armed and self.mode is not Mode.HOLD
-        if watched and now_s - self._gcs_s > patience:
-            self.say(CRITICAL, "Radio Failsafe")
+        if watched and now_s - self._ground_s > patience:
+            self.texts.append((CRITICAL, "Radio Failsafe"))
             self.set_mode(Mode.HOLD, now_s)
 
     def order(self) -> Order:
@@ -218,16 +168,9 @@ class Vehicle:
             return self.target
         return Keep(self.settings.back_up_m if self._timed_out else 0.0)
 
-    def _timeout_s(self) -> float:
-        return self.parameters.get("GUID_TIMEOUT", self.settings.timeout_s)
 
-
-HEARTBEAT_S = 1.0
-_PHASE_S = STEP_S
-"""A stream begins at a multiple of this, so that it tells each new state of the hull as soon as there is one."""
-
+HEARTBEAT, HEARTBEAT_S = mavlink.MAVLINK_MSG_ID_HEARTBEAT, 1.0
 GROUPS: dict[int, tuple[int, ...]] = {
-    mavlink.MAV_DATA_STREAM_RAW_SENSORS: (),
     mavlink.MAV_DATA_STREAM_EXTENDED_STATUS: (mavlink.MAVLINK_MSG_ID_SYS_STATUS, mavlink.MAVLINK_MSG_ID_GPS_RAW_INT),
     mavlink.MAV_DATA_STREAM_POSITION: (
         mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
@@ -241,41 +184,29 @@ GROUPS: dict[int, tuple[int, ...]] = {
 
 
 class Streams:
-    """Intervals of one boat's messages.
-
-    Args:
-        top_rate_hz: highest rate of one message; faster requests are slowed to it.
-        known: ids of the messages it can send.
-    """
+    """Intervals of one boat's messages, at first heartbeats only; nothing is sent faster than ``top_rate_hz``."""
 
     def __init__(self, top_rate_hz: float, known: frozenset[int]) -> None:
-        self._shortest_s = 1.0 / top_rate_hz
-        self._known = known
-        self.reset()
-
-    def reset(self) -> None:
-        """As after power on: heartbeats only."""
-        self._interval_s = {mavlink.MAVLINK_MSG_ID_HEARTBEAT: HEARTBEAT_S}
+        self._shortest_s, self._known = 1.0 / top_rate_hz, known
+        self._interval_s = {HEARTBEAT: HEARTBEAT_S}
         self._next_s: dict[int, float] = {}
 
     def set_interval(self, message: int, interval_us: float) -> bool:
         """SET_MESSAGE_INTERVAL: -1 never, 0 the default; False for a message it cannot send."""
         if message not in self._known:
             return False
+        self._interval_s.pop(message, None)
+        self._next_s.pop(message, None)
         if interval_us > 0.0:
             self._interval_s[message] = max(interval_us * 1e-6, self._shortest_s)
-        elif message == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
+        elif message == HEARTBEAT:
             self._interval_s[message] = HEARTBEAT_S
-        else:
-            self._interval_s.pop(message, None)
-        self._next_s.pop(message, None)
         return True
 
     def set_group(self, group: int, rate_hz: int) -> None:
         """REQUEST_DATA_STREAM: all messages of a group, 0 Hz stops them."""
-        groups = GROUPS if group == mavlink.MAV_DATA_STREAM_ALL else {group: GROUPS.get(group, ())}
-        for messages in groups.values():
-            for message in messages:
+        for number, messages in GROUPS.items():
+            for message in messages if group in (number, mavlink.MAV_DATA_STREAM_ALL) else ():
                 self.set_interval(message, 1e6 / rate_hz if rate_hz > 0 else -1.0)
 
     def interval_us(self, message: int) -> int:
@@ -285,10 +216,13 @@ class Streams:
         return round(self._interval_s[message] * 1e6) if message in self._interval_s else -1
 
     def due(self, now_s: float) -> list[int]:
-        """Messages to send now; one that fell behind is sent once."""
+        """Messages to send now; one that fell behind is sent once.
+
+        Each begins at a multiple of the hull's step, so that it tells each new state as soon as there is one.
+        """
         due = []
         for message, interval in self._interval_s.items():
-            at = self._next_s.setdefault(message, math.ceil(now_s / _PHASE_S - 1e-6) * _PHASE_S)
+            at = self._next_s.setdefault(message, math.ceil(now_s / STEP_S - 1e-6) * STEP_S)
             if at <= now_s + 1e-9:
                 due.append(message)
                 self._next_s[message] = at + interval if at + interval > now_s else now_s + interval

@@ -15,9 +15,8 @@ from steerclear.shield.bridge.mavlink.transport import Address, Peer, make_wire,
 from steerclear.shield.exceptions import ConfigError, LinkError
 
 from .boat import Boat
-from .moos import Community
+from .moos import LOOPBACK
 
-LOOPBACK, ANY = "127.0.0.1", "0.0.0.0"
 FREE_PORT = f"udpout:{LOOPBACK}:0"
 OTHER_END = {"udpin": "udpout", "udpout": "udpin", "tcp": "tcpin", "tcpin": "tcp"}
 """What a boat opens at an address of the runner's side, by its kind."""
@@ -37,25 +36,17 @@ def near(address: str, allow_remote: bool) -> str:
 
 
 def _near_host(host: str, address: str, allow_remote: bool) -> str:
-    if host in ("localhost", ANY):
+    if host in ("localhost", "0.0.0.0"):
         return LOOPBACK
     with contextlib.suppress(ValueError):
-        if allow_remote or ipaddress.ip_address(host).is_loopback:
-            return host
+        allow_remote = allow_remote or ipaddress.ip_address(host).is_loopback
     if allow_remote:
         return host
-    raise ConfigError(f"{address!r} is not on this machine; simulated boats stay on 127.0.0.1 unless told")
+    raise ConfigError(f"{address!r} is not on this machine; simulated boats stay on {LOOPBACK} unless told")
 
 
 class BoatWire:
-    """The boats' end of one link, never blocking.
-
-    Args:
-        address: what the runner's side opens.
-
-    Attributes:
-        address: the same, with the port that was chosen.
-        aboard: boats behind it.
+    """The boats' end of one link, never blocking; ``address``: what the runner's side opens, with the port chosen.
 
     Raises:
         ConfigError: it cannot be opened.
@@ -66,12 +57,12 @@ class BoatWire:
         self._framers: dict[Peer, Framer] = {}
         self._dial_s = 0.0
         self.aboard: list[Boat] = []
-        listens = address.kind in ("udpout", "tcp")
         if address.kind != "tcpin":  # a boat that dials tries again and again
             try:
                 self._wire.open()
             except LinkError as error:
                 raise ConfigError(f"simulated boat at {address}: {error}") from None
+        listens = address.kind in ("udpout", "tcp")
         self.address = str(Address(address.kind, address.host, self._wire.port if listens else address.number))
 
     def fileno(self) -> int:
@@ -80,21 +71,20 @@ class BoatWire:
 
     def read(self) -> Iterator[bytes]:
         """Whole frames that have come in."""
-        self._dial()
-        while True:
-            try:
-                received = self._wire.receive()
-            except OSError:  # the other end is gone; another may come, or be dialled
-                self._framers.clear()
-                return
-            if received is None:
-                return
-            data, peer = received
-            framer = self._framers.pop(peer, None) or Framer(self._wire.datagrams)
-            self._framers[peer] = framer  # the latest heard comes last
-            while len(self._framers) > MOST_PEERS:
-                del self._framers[next(iter(self._framers))]
-            yield from framer.feed(data)
+        if self._wire.fileno() < 0 and time.monotonic() >= self._dial_s:
+            self._dial_s = time.monotonic() + REDIAL_S
+            with contextlib.suppress(LinkError):
+                self._wire.open(DIAL_S)
+        try:
+            while (received := self._wire.receive()) is not None:
+                data, peer = received
+                framer = self._framers.pop(peer, None) or Framer(self._wire.datagrams)
+                self._framers[peer] = framer  # the latest heard comes last
+                while len(self._framers) > MOST_PEERS:
+                    del self._framers[next(iter(self._framers))]
+                yield from framer.feed(data)
+        except OSError:  # the other end is gone; another may come, or be dialled
+            self._framers.clear()
 
     def write(self, packet: bytes) -> None:
         """Send to whoever is there; what cannot be sent is lost."""
@@ -106,32 +96,19 @@ class BoatWire:
         self._wire.close()
         self._dial_s = float("inf")
 
-    def _dial(self) -> None:
-        if self._wire.fileno() < 0 and time.monotonic() >= self._dial_s:
-            self._dial_s = time.monotonic() + REDIAL_S
-            with contextlib.suppress(LinkError):
-                self._wire.open(DIAL_S)
-
 
 class Ports:
-    """The wires of all boats. Boats of one address share its wire, but each calls over UDP from a port of its own.
+    """The wires of all boats, and the address to open for each.
 
-    Args:
-        allow_remote: whether links may leave this machine.
+    Boats of one address share its wire, but each calls over UDP from a port of its own.
     """
 
     def __init__(self, allow_remote: bool) -> None:
         self._allow_remote = allow_remote
+        self.addresses: dict[str, str] = {}
         self._shared: dict[str, BoatWire] = {}
         self._wires: list[BoatWire] = []
-        self._communities: dict[str, Community] = {}
         self._reader = mavlink.MAVLink(None)
-
-    @property
-    def addresses(self) -> dict[str, str]:
-        """Address to open for each boat with a link."""
-        wired = {boat.spec.name: wire.address for wire in self._wires for boat in wire.aboard}
-        return wired | {name: f"{MOOS}{LOOPBACK}:{aboard.db.port}" for name, aboard in self._communities.items()}
 
     def plug_in(self, boat: Boat) -> None:
         """Open a boat's link, if it has one.
@@ -139,18 +116,18 @@ class Ports:
         Raises:
             ConfigError: the address or system id cannot be used.
         """
-        address = boat.spec.address
+        address, name = boat.spec.address, boat.spec.name
         if address is None:
             return
         if boat.community is not None:
-            self._communities[boat.spec.name] = boat.community
+            self.addresses[name] = f"{MOOS}{LOOPBACK}:{boat.community.db.port}"
             return
         if not 1 <= boat.system_id <= 255:
-            raise ConfigError(f"boat {boat.spec.name!r} has system id {boat.system_id}; give one of 1..255")
-        wire = self._wire(address)
+            raise ConfigError(f"boat {name!r} has system id {boat.system_id}; give one of 1..255")
+        wire = self._shared.get(address) or self._open(address)
         if any(other.system_id == boat.system_id for other in wire.aboard):
             raise ConfigError(f"two boats on {address} have system id {boat.system_id}; give each one of its own")
-        boat.write = wire.write
+        boat.write, self.addresses[name] = wire.write, wire.address
         wire.aboard.append(boat)
 
     def sockets(self) -> list[int]:
@@ -170,8 +147,6 @@ class Ports:
         """Give the sockets back."""
         for wire in self._wires:
             wire.close()
-        for community in self._communities.values():
-            community.close()
 
     def _target_of(self, packet: bytes) -> int:
         """System that a whole frame is for; 0: all, or it cannot be read, which each boat finds out."""
@@ -180,22 +155,15 @@ class Ports:
         except Exception:  # a decoder that trips over hostile bytes must not end the boats
             return 0
 
-    def _wire(self, address: str) -> BoatWire:
-        if address in self._shared:
-            return self._shared[address]
-        found = _parsed(address or FREE_PORT)
+    def _open(self, address: str) -> BoatWire:
+        try:
+            found = parse_address(address or FREE_PORT)
+        except LinkError as error:
+            raise ConfigError(f"cannot simulate a boat at {address!r}: {error}") from None
+        if found.kind not in OTHER_END:
+            raise ConfigError(f"cannot simulate a boat at {address!r}; give udpin, udpout, tcp or tcpin:HOST:PORT")
         wire = BoatWire(Address(found.kind, _near_host(found.host, address, self._allow_remote), found.number))
         self._wires.append(wire)
         if address and found.kind != "udpin":
             self._shared[address] = wire
         return wire
-
-
-def _parsed(address: str) -> Address:
-    try:
-        found = parse_address(address)
-    except LinkError as error:
-        raise ConfigError(f"cannot simulate a boat at {address!r}: {error}") from None
-    if found.kind not in OTHER_END:
-        raise ConfigError(f"cannot simulate a boat at {address!r}; give udpin, udpout, tcp or tcpin:HOST:PORT")
-    return found

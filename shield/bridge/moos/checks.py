@@ -43,13 +43,7 @@ class Watched:
 
 
 def moos_checks(links: Mapping[str, MoosLink], fleet: FleetFile, seconds: float = WATCH_S) -> list[Check]:
-    """All of them; the first to run watches all links for ``seconds``.
-
-    Args:
-        links: connected, by boat's name.
-        fleet: the file.
-        seconds: how long links are watched, real s.
-    """
+    """All of them; the first to run watches all links, connected, for so many real s."""
     watch = Watch(links, MonotonicClock(), seconds)
 
     def look(boat: str) -> Watched:

@@ -76,13 +76,13 @@ class MoosClient:
     """Connects, registers, reads, beats, and does so again whenever the connection ends. Close it at the end.
 
     Attributes:
-        warp: how many times faster than real time ``clock`` runs.
+        warp: how many times faster than real time ``clock`` runs, as the community's MOOSTimeWarp must say.
         ahead_s: MOOS time less the loop's clock, s; NaN while it is not known.
 
     Args:
         name: its own; a MOOSDB takes one client of a name.
         host, port: of the MOOSDB.
-        clock: the loop's, which runs as many times faster than real time as the community's MOOSTimeWarp says.
+        clock: the loop's.
         variables: what to register for: every write.
         hear: called for each mail with the time it came, s of ``clock``; in the client's thread.
         lost: called when a connection ends, in the client's thread.

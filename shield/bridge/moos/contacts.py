@@ -38,13 +38,8 @@ class MoosContacts:
     """Takes reports from the links' threads, gives contacts to the loop; a `ContactSource` that can raise alarms.
 
     TIME in a report is the reporter's clock when it posted, not the age of the position: whether the position moves as
-    its speed says is watched where contacts of all sources are, see `contact_fusion`.
-
-    Args:
-        frame: of the field.
-        corner_m: the field's corner on the local grid, m.
-        names: boats of the fleet file.
-        error_m: bound of their positions' errors, m.
+    its speed says is watched where contacts of all sources are, see `contact_fusion`. ``corner_m``: the field's corner
+    on the local grid, m; ``error_m``: bound of the positions' errors, m.
     """
 
     def __init__(
@@ -57,13 +52,7 @@ class MoosContacts:
         self._now_s = -math.inf
 
     def hear(self, text: str, heard_by: str, to_clock: float, received_s: float) -> str:
-        """Take a report in.
-
-        Args:
-            text: its fields.
-            heard_by: name of the boat whose MOOSDB it came by.
-            to_clock: the loop's clock less MOOS time, s.
-            received_s: when it came, s of the loop's clock.
+        """Take a report's text in that came by ``heard_by``'s MOOSDB; ``to_clock``: the loop's clock less MOOS time, s.
 
         Returns:
             Why it is not believed; empty: it is.

@@ -21,12 +21,7 @@ ECHO_S = 1.0
 
 
 class Drivers:
-    """Not thread-safe: its owner holds a lock.
-
-    Args:
-        ours: name of our client.
-        outputs: variables that our gate alone may write.
-        prefix: what the helm puts before its own.
+    """Not thread-safe: its owner holds a lock. ``outputs``: variables that our gate alone may write.
 
     Attributes:
         faults: what somebody else did, by kind; the owner empties it.
@@ -79,15 +74,9 @@ class Drivers:
         )
 
     def hear(self, message: Message, now_s: float, age_s: float) -> str:
-        """Take mail in.
+        """Take mail in; a text for the operator, mostly empty.
 
-        Args:
-            message: the mail.
-            now_s: when it came, s.
-            age_s: since it was posted, s: the first mail of a variable may be what stood there before us.
-
-        Returns:
-            A text for the operator, mostly empty.
+        Its age tells what was posted before us: the first mail of a variable may be what stood there.
         """
         live = message.key in self._known or not age_s > ECHO_S
         self._known.add(message.key)

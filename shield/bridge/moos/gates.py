@@ -90,12 +90,7 @@ class Gate:
 
 
 class HelmGate(Gate):
-    """Between the helm and the PID: headings, deg true, and speeds, m/s.
-
-    Args:
-        frame: of the field.
-        prefix: what the helm puts before its own.
-    """
+    """Between the helm and the PID: headings, deg true, and speeds, m/s; the helm puts ``prefix`` before its own."""
 
     outputs = ("DESIRED_HEADING", "DESIRED_SPEED")
 
@@ -181,17 +176,10 @@ class PidGate(Gate):
 
 
 class Autopilot:
-    """A platform's own autopilot, on headings and speeds that somebody else measured.
-
-    Attributes:
-        row: (N_STATE,) what it remembers.
-
-    Args:
-        platform: one that is moved by rudder and thrust.
-        dt_s: between two steps, s.
+    """A platform's own autopilot, on headings and speeds that somebody else measured; ``row``: what it remembers.
 
     Raises:
-        ConfigError: it is not.
+        ConfigError: the platform is not moved by rudder and thrust.
     """
 
     def __init__(self, platform: Platform, dt_s: float) -> None:

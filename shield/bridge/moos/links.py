@@ -25,10 +25,7 @@ POLICY = "moos"
 class MoosLinks(LinkMaker):
     """A `LinkMaker`: a client in each boat's own MOOSDB, and one `ContactSource` for all of them.
 
-    Args:
-        fleet: the file.
-        clock: the loop's.
-        on_bytes: not used: a community's own pLogger keeps what passes.
+    Packets are not recorded: a community's own pLogger keeps what passes.
     """
 
     def __init__(self, fleet: FleetFile, clock: Clock, on_bytes: object = None) -> None:
@@ -55,11 +52,7 @@ class MoosLinks(LinkMaker):
 
 
 class MoosNominal(WantedSource):
-    """A policy that is somebody else's: what each boat's own community wants, through its gate.
-
-    Args:
-        fleet: the file.
-        boats: those this process commands.
+    """A policy that is somebody else's: what the own community of each boat we command wants, through its gate.
 
     Raises:
         ConfigError: one of them has no moos:// link.

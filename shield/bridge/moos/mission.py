@@ -32,16 +32,7 @@ def parse_mission(text: str) -> Mission:
 
 
 def mission_faults(mission: Mission, port: int, warp: float, platform: Platform, gate: str, prefix: str) -> list[str]:
-    """Everything in a mission that would undo the shield, each with its remedy.
-
-    Args:
-        mission: of the boat.
-        port: at which its MOOSDB is to be.
-        warp: of this run.
-        platform: of the boat.
-        gate: "helm" or "pid".
-        prefix: what the helm is to put before its DESIRED_*.
-    """
+    """Everything in a boat's mission that would undo the shield, each with its remedy; ``port``: of its MOOSDB."""
     return list(_faults(mission, port, warp, platform, gate, prefix))
 
 

@@ -33,11 +33,7 @@ REFUSED = {
 
 
 class Navigation:
-    """Not thread-safe: its owner holds a lock.
-
-    Args:
-        frame: of the field.
-        corner_m: the field's corner on the boat's local grid, x east and y north, m.
+    """Not thread-safe: its owner holds a lock. ``corner_m``: the field's corner on the local grid, east and north, m.
 
     Attributes:
         faults: what was refused, by kind; the owner empties it.
@@ -59,16 +55,7 @@ class Navigation:
         self._values: dict[str, tuple[float, float]] = {}
 
     def hear(self, message: Message, true_s: float, received_s: float) -> str:
-        """Take one NAV_* in.
-
-        Args:
-            message: the mail.
-            true_s: its stamp on the loop's clock, s.
-            received_s: when it came, s.
-
-        Returns:
-            A text for the operator, mostly empty.
-        """
+        """Take one NAV_* in, stamped ``true_s`` on the loop's clock; a text for the operator, mostly empty."""
         if fault := _fault(message, true_s, received_s):
             self.faults[fault] += 1
             return f"{message.key} of {message.source} is refused: {REFUSED[fault]}"

@@ -7,7 +7,7 @@ from boat_bench import Bench, attitude
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from steerclear.experiments.sim_boats import Water
-from steerclear.experiments.sim_boats.hull import Bear, Coast, Helmsman, Hull, Keep, Steer, Turn, Weather
+from steerclear.experiments.sim_boats.hull import Bear, Coast, Hull, Keep, Steer, Turn, Weather
 from steerclear.shield.bridge.frame import FieldFrame
 from steerclear.shield.commands import Commands
 from steerclear.shield.exceptions import ConfigError
@@ -19,7 +19,7 @@ SPEEDS = st.floats(0.0, 4.0)
 
 
 def hull(platform="heron", speed_mps=0.0, heading_deg=0.0, brake_mps2=1.2):
-    made = Hull.at(get_platform(platform), 0.0, 0.0, heading_deg, brake_mps2)
+    made = Hull(get_platform(platform), 0.0, 0.0, heading_deg, brake_mps2)
     made.state[L.SPEED] = speed_mps
     return made
 
@@ -30,9 +30,8 @@ def hull(platform="heron", speed_mps=0.0, heading_deg=0.0, brake_mps2=1.2):
 def test_a_step_ahead_in_still_water_is_the_simulators_bit_for_bit(platform, commands):
     boat = hull(platform, heading_deg=33.0)
     state, params = fresh_state(0.0, 0.0, 33.0), get_platform(platform).pack()
-    helmsman = Helmsman(boat)
     for heading_rad, speed_mps in commands:
-        helmsman.step(Steer(heading_rad, speed_mps))
+        boat.obey(Steer(heading_rad, speed_mps))
         wanted = Commands.absolute_rad([[speed_mps, heading_rad]]).as_relative_deg(np.array([state[L.HEADING]]))
         step_boat(params, state, *wanted[0], 0.1)
         assert np.array_equal(boat.state, state, equal_nan=True)
@@ -41,17 +40,16 @@ def test_a_step_ahead_in_still_water_is_the_simulators_bit_for_bit(platform, com
 def test_a_bearing_is_the_simulators_too():
     boat, state, params = hull(), fresh_state(0.0, 0.0, 0.0), get_platform("heron").pack()
     for error in (30.0, -45.0, 0.0, 180.0):
-        Helmsman(boat).step(Bear(error, 1.5))
+        boat.obey(Bear(error, 1.5))
         step_boat(params, state, 1.5, error, 0.1)
         assert np.array_equal(boat.state, state, equal_nan=True)
 
 
 def test_goes_astern_only_through_rest_and_stern_first():
     boat = hull(speed_mps=1.0)
-    helmsman = Helmsman(boat)
     speeds = []
     for _ in range(150):
-        helmsman.step(Steer(0.0, -1.0))
+        boat.obey(Steer(0.0, -1.0))
         speeds.append(boat.speed_mps)
     assert all(abs(b - a) < 0.3 for a, b in itertools.pairwise(speeds))
     assert speeds[-1] == pytest.approx(-1.0, abs=0.05)
@@ -59,16 +57,15 @@ def test_goes_astern_only_through_rest_and_stern_first():
     assert boat.heading_rad == pytest.approx(0.0, abs=0.02)  # the bow still points north
     assert boat.velocity_mps[1] == pytest.approx(-1.0, abs=0.05)
     for _ in range(150):
-        helmsman.step(Steer(0.0, 1.0))
+        boat.obey(Steer(0.0, 1.0))
     assert boat.speed_mps == pytest.approx(1.0, abs=0.05)
 
 
 def test_a_stop_of_the_autopilot_is_hard_or_the_platforms():
     hard, own = hull(speed_mps=2.0), hull(speed_mps=2.0, brake_mps2=None)
     for boat in (hard, own):
-        helmsman = Helmsman(boat)
         for _ in range(40):
-            helmsman.step(Keep())
+            boat.obey(Keep())
     assert hard.speed_mps == 0.0
     assert hard.state[L.Y] == pytest.approx(2.0**2 / 2.4, abs=0.1)
     assert own.state[L.Y] > 1.5 * hard.state[L.Y]
@@ -76,10 +73,9 @@ def test_a_stop_of_the_autopilot_is_hard_or_the_platforms():
 
 def test_backs_up_and_stays():
     boat = hull(speed_mps=1.0)
-    helmsman = Helmsman(boat)
     places = []
     for _ in range(400):
-        helmsman.step(Keep(back_up_m=2.0))
+        boat.obey(Keep(back_up_m=2.0))
         places.append(boat.state[L.Y])
     assert max(places) - places[-1] == pytest.approx(2.0, abs=0.15)
     assert places[-1] == places[-50]
@@ -90,10 +86,9 @@ def test_backs_up_and_stays():
 def test_returns_when_the_current_sets_it_off():
     boat = hull()
     boat.drift_mps = (0.3, 0.0)
-    helmsman = Helmsman(boat)
     far = 0.0
     for _ in range(1500):
-        helmsman.step(Keep())
+        boat.obey(Keep())
         far = max(far, math.hypot(*boat.state[:2]))
     assert 2.9 < far < 6.0
 
@@ -101,15 +96,14 @@ def test_returns_when_the_current_sets_it_off():
 def test_motors_off_slows_down():
     boat = hull(speed_mps=2.0)
     for _ in range(100):
-        Helmsman(boat).step(Coast())
+        boat.obey(Coast())
     assert boat.speed_mps == pytest.approx(0.0, abs=0.05)
 
 
 def test_turns_at_a_rate():
     boat = hull(speed_mps=1.0)
-    helmsman = Helmsman(boat)
     for _ in range(60):
-        helmsman.step(Turn(0.2, 1.0))
+        boat.obey(Turn(0.2, 1.0))
     assert boat.turn_rate_rads == pytest.approx(0.2, abs=0.01)
 
 
@@ -117,9 +111,8 @@ def test_turns_at_a_rate():
 def test_speed_is_kept_over_ground(drift, heading_rad):
     boat = hull()
     boat.drift_mps = drift
-    helmsman = Helmsman(boat)
     for _ in range(400):
-        helmsman.step(Steer(heading_rad, 1.0))
+        boat.obey(Steer(heading_rad, 1.0))
     vx, vy = boat.velocity_mps
     assert vx * math.sin(heading_rad) + vy * math.cos(heading_rad) == pytest.approx(1.0, abs=0.03)
     assert boat.heading_rad == pytest.approx(heading_rad, abs=0.02)
@@ -128,9 +121,9 @@ def test_speed_is_kept_over_ground(drift, heading_rad):
 def test_wind_and_current_drift_along_the_field():
     frame = FieldFrame(42.0, -71.0, 90.0)  # the field's y axis points east
     weather = Weather(Water(current_mps=0.5, current_to_deg=90.0), frame, np.random.default_rng(0))
-    assert weather.drift_mps(0.1) == pytest.approx((0.0, 0.5))
+    assert weather.drift_mps() == pytest.approx((0.0, 0.5))
     windy = Weather(Water(wind_mps=10.0, wind_from_deg=270.0), frame, np.random.default_rng(0))
-    drifts = np.array([windy.drift_mps(0.1) for _ in range(20_000)])
+    drifts = np.array([windy.drift_mps() for _ in range(20_000)])
     assert drifts.mean(axis=0) == pytest.approx((0.0, 0.3), abs=0.02)
     assert drifts[:, 1].std() == pytest.approx(0.09, abs=0.02)
 

@@ -7,7 +7,7 @@ from boat_links import READY
 from steerclear.experiments.sim_boats import SimBoat, SimFleet
 from steerclear.experiments.sim_boats.hull import STEP_S
 from steerclear.experiments.sim_boats.report import _counts
-from steerclear.experiments.sim_boats.truth import Mark, Marks
+from steerclear.experiments.sim_boats.truth import Mark, circumstances, last_commanded
 from steerclear.experiments.sim_boats.vehicle import Mode
 
 STEERED = Mark(True, (), True)
@@ -16,30 +16,27 @@ PLAYED = Mark(True)
 LEFT = Mark(False, held=True)
 
 
-def marks_of(*rows):
-    marks = Marks()
-    for row in rows:
-        marks.add(row)
-    return marks
+def held_by(rows, step, boats):
+    return circumstances(rows, last_commanded(rows), step, boats)
 
 
 def test_how_long_a_boat_was_steered_by_nobody_is_told():
-    marks = marks_of(*[(STEERED, PLAYED)] * 3, *[(ALONE, PLAYED)] * 4, (STEERED, PLAYED))
-    assert marks.of(7, (0, 1)) == {"unsteered_s": [0.4, 0.0], "faults": ["link_loss"], "after_run": False}
-    assert marks.of(3, (0, 1)) == {"unsteered_s": [0.0, 0.0], "faults": [], "after_run": False}
+    rows = [*[(STEERED, PLAYED)] * 3, *[(ALONE, PLAYED)] * 4, (STEERED, PLAYED)]
+    assert held_by(rows, 7, (0, 1)) == {"unsteered_s": [0.4, 0.0], "faults": ["link_loss"], "after_run": False}
+    assert held_by(rows, 3, (0, 1)) == {"unsteered_s": [0.0, 0.0], "faults": [], "after_run": False}
 
 
 def test_a_fault_counts_for_five_seconds():
     rows = [(ALONE,), *[(STEERED,)] * 60]
-    assert marks_of(*rows).of(50, (0,))["faults"] == ["link_loss"]
-    assert marks_of(*rows).of(52, (0,))["faults"] == []
+    assert held_by(rows, 50, (0,))["faults"] == ["link_loss"]
+    assert held_by(rows, 52, (0,))["faults"] == []
 
 
 def test_the_run_is_over_when_nobody_commands_any_more():
-    marks = marks_of(*[(STEERED, PLAYED)] * 5, *[(LEFT, PLAYED)] * 5)
-    assert not marks.of(5, (0, 1))["after_run"]
-    assert marks.of(6, (0, 1))["after_run"]
-    assert not marks_of(*[(PLAYED,)] * 5).of(5, (0,))["after_run"], "nobody ever commanded: no run"
+    rows = [*[(STEERED, PLAYED)] * 5, *[(LEFT, PLAYED)] * 5]
+    assert not held_by(rows, 5, (0, 1))["after_run"]
+    assert held_by(rows, 6, (0, 1))["after_run"]
+    assert not held_by([(PLAYED,)] * 5, 5, (0,))["after_run"], "nobody ever commanded: no run"
 
 
 @pytest.mark.parametrize(
@@ -54,10 +51,9 @@ def test_the_run_is_over_when_nobody_commands_any_more():
 def test_a_runner_that_dies_does_not_end_the_run(gap_s, then, in_order):
     gap = round(gap_s / STEP_S)
     rows = [*[(STEERED, PLAYED, STEERED)] * 5, *[(Mark(False), PLAYED, LEFT)] * gap, *[(then, PLAYED, LEFT)] * 5]
-    marks = marks_of(*rows)
-    assert marks.of(len(rows), (0, 1))["after_run"] == in_order
-    assert marks.of(len(rows), (2, 1))["after_run"], "the other was left in order"
-    assert marks.of(len(rows), (2, 0))["after_run"] == in_order
+    assert held_by(rows, len(rows), (0, 1))["after_run"] == in_order
+    assert held_by(rows, len(rows), (2, 1))["after_run"], "the other was left in order"
+    assert held_by(rows, len(rows), (2, 0))["after_run"] == in_order
 
 
 def test_a_boat_in_hold_says_so():

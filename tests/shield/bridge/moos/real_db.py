@@ -28,7 +28,7 @@ class Frozen:
 
 
 class RealDb:
-    """See `stand_in_db.StandInDb`; a client of it posts for all apps aboard, each under its own name."""
+    """See `stand_in.StandInDb`; a client of it posts for all apps aboard, each under its own name."""
 
     def __init__(self, community, port, warp=1.0, hear=lambda message: None):
         self.port, self.warp, self._hear, self.latest = port, warp, hear, {}

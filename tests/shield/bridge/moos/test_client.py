@@ -15,7 +15,7 @@ import pytest
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.moos import client as client_module
 from steerclear.shield.bridge.moos.client import MoosClient
-from steerclear.shield.bridge.moos.stand_in_db import StandInDb
+from steerclear.shield.bridge.moos.stand_in import StandInDb
 from steerclear.shield.bridge.moos.wire import PROTOCOL, Message, WireError, pack_packet, timing
 
 logging.getLogger("steerclear").setLevel(logging.ERROR)
