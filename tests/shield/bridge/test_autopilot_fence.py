@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import pytest
 from bridge_fakes import fleet_of, fleet_text
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
-from steerclear.shield.bridge.autopilot_fence import check_fence, hard_line, needed_m, stopping_way_m
 from steerclear.shield.bridge.fleet_file import parse_fleet
+from steerclear.shield.bridge.link_checks import check_fence, hard_line, needed_m, stopping_way_m
 from steerclear.shield.bridge.mavlink.fence import FenceReader, FenceZone
 from steerclear.shield.platforms import get_platform
 
