@@ -25,11 +25,15 @@ AVOIDS = 3.0
 ASKED = (
     "FS_GCS_ENABLE", "GUID_TIMEOUT", "SYSID_MYGCS", "SYSID_ENFORCE", "MAV_GCS_SYSID", "MAV_GCS_SYSID_HI", "MAV_OPTIONS",
     "ARMING_CHECK", "ARMING_SKIPCHK", "FENCE_ENABLE", "AVOID_ENABLE", *OBSTACLE_SENSORS, "BCN_TYPE",
-    "OA_TYPE", "SAIL_ENABLE",
+    "OA_TYPE", "SAIL_ENABLE", "FS_ACTION", "BATT_FS_LOW_ACT", "BATT_FS_CRT_ACT",
 )  # fmt: skip
 """Parameters that are looked at here, besides WP_SPEED."""
-FENCE_ASKED = ("FENCE_TYPE", "FENCE_RADIUS", "FENCE_MARGIN", "AVOID_MARGIN")
+FENCE_ASKED = ("FENCE_TYPE", "FENCE_RADIUS", "FENCE_MARGIN", "FENCE_ACTION", "AVOID_MARGIN")
 """Those of a fence that is on, see `fence`."""
+
+HOLD = 2
+SAILS = {1: "RTL", 3: "SmartRTL or RTL", 4: "SmartRTL or Hold", 6: "Loiter or Hold"}
+"""Rover's answers to a fail-safe, and to its fence, in which the autopilot steers the boat by itself."""
 
 
 def parameter_faults(known: Mapping[str, float], platform: Platform) -> list[str]:
@@ -43,7 +47,16 @@ def parameter_faults(known: Mapping[str, float], platform: Platform) -> list[str
         )
     if not 0.0 < timeout <= STANDARD_TIMEOUT_S:
         faults.append(f"GUID_TIMEOUT is {timeout:g} s: set it to {STANDARD_TIMEOUT_S:g} or less")
-    return [fault for fault in (*faults, _arming(known), _ground(known), *_changes(known)) if fault]
+    answers = (sails_by_itself(known, name) for name in ("FS_ACTION", "BATT_FS_LOW_ACT", "BATT_FS_CRT_ACT"))
+    return [fault for fault in (*faults, _arming(known), _ground(known), *_changes(known), *answers) if fault]
+
+
+def sails_by_itself(known: Mapping[str, float], name: str) -> str:
+    """What is wrong with an answer of the autopilot that sails the boat past the shield; empty: it does not."""
+    value = _bits(known, name, HOLD)
+    if value not in SAILS:
+        return ""
+    return f"{name} is {value} ({SAILS[value]}), so the autopilot would sail among boats past the shield: set it to 2"
 
 
 def _arming(known: Mapping[str, float]) -> str:

@@ -17,7 +17,7 @@ import numpy as np
 from ..platforms import Platform, step_boat
 from ..platforms import layout as L
 from ..platforms.limits import cruise
-from .autopilot_parameters import STANDARD_TIMEOUT_S, parameter_faults
+from .autopilot_parameters import HOLD, STANDARD_TIMEOUT_S, parameter_faults, sails_by_itself
 from .clock import Clock
 from .fleet_file import FleetFile
 from .mavlink.fence import FenceZone
@@ -256,6 +256,11 @@ def check_fence(boat: str, fleet: FleetFile, link: Fenced) -> CheckResult:
         return CheckResult(name, True, "its own fence is off")
     value = {**DEFAULTS, **known}
     kinds = int(value["FENCE_TYPE"])
+    if answer := sails_by_itself(known, "FENCE_ACTION"):
+        return CheckResult(name, False, answer)
+    if known.get("FENCE_ACTION") == 0.0:
+        text = f"FENCE_ACTION is 0, so its own fence only reports and stops nothing: set it to {HOLD}, or {off}"
+        return CheckResult(name, False, text)
     if fleet.geofence.then == "flee":
         text = f"geofence.then is flee, so its own fence (FENCE_ENABLE) may take the boat away: {off}, or then: stop"
         return CheckResult(name, False, text)

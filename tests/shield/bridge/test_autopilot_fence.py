@@ -91,6 +91,16 @@ def test_a_fence_nobody_heard_is_not_taken_and_one_that_is_off_is():
     assert checked(None, {}).passed
 
 
+@pytest.mark.parametrize(
+    ("action", "words"),
+    [(0.0, "only reports"), (1.0, "FENCE_ACTION is 1 (RTL)"), (4.0, "past the shield: set it to 2"), (2.0, "")],
+)
+def test_a_fence_is_a_last_resort_only_where_it_holds_the_boat(action, words):
+    result = checked([box(80.0)], {**ON, "FENCE_ACTION": action})
+    assert result.passed == (not words), result.text
+    assert words in result.text
+
+
 def test_where_boats_may_flee_for_ever_no_fence_is_taken():
     fleet = parse_fleet(fleet_text(platform="ardurover_boat").replace("geofence: {", "geofence: {then: flee, "))
     assert "then is flee" in checked([box(500.0)], fleet=fleet).text

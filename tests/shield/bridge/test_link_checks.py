@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from steerclear.shield.bridge.autopilot_parameters import ASKED
+from steerclear.shield.bridge.autopilot_parameters import ASKED, FENCE_ASKED
 from steerclear.shield.bridge.clock import ManualClock
 from steerclear.shield.bridge.link_checks import (
     Watched,
@@ -167,6 +167,10 @@ def test_each_fault_is_found_and_named(check, said, changes, words):
         ({"AVOID_ENABLE": 7.0, "BCN_TYPE": 1.0}, "AVOID_ENABLE has bit 2 and BCN_TYPE is on"),
         ({"OA_TYPE": 1.0}, "OA_TYPE is 1, so the autopilot changes commands after the shield: set OA_TYPE to 0"),
         ({"SAIL_ENABLE": 1.0}, "set SAIL_ENABLE to 0"),
+        ({"FS_ACTION": 1.0}, "FS_ACTION is 1 (RTL), so the autopilot would sail among boats past the shield"),
+        ({"FS_ACTION": 6.0}, "FS_ACTION is 6 (Loiter or Hold)"),
+        ({"BATT_FS_LOW_ACT": 4.0}, "BATT_FS_LOW_ACT is 4 (SmartRTL or Hold)"),
+        ({"BATT_FS_CRT_ACT": 3.0}, "BATT_FS_CRT_ACT is 3"),
     ],
 )
 def test_autopilot(parameters, words):
@@ -190,6 +194,8 @@ def test_autopilot(parameters, words):
         {"FENCE_ENABLE": 1.0, "AVOID_ENABLE": 0.0},
         {"AVOID_ENABLE": 3.0, "PRX1_TYPE": 0.0},
         {"OA_TYPE": 0.0},
+        {"FS_ACTION": 2.0, "BATT_FS_LOW_ACT": 0.0, "BATT_FS_CRT_ACT": 5.0},
+        {"FS_ACTION": 0.0},
     ],
 )
 def test_an_autopilot_whose_settings_change_nothing_passes(parameters):
@@ -224,4 +230,6 @@ def test_what_was_refused_before_the_watch_is_not_of_it():
 
 def test_every_parameter_that_is_looked_at_is_asked_for():
     assert {"MAV_GCS_SYSID", "MAV_OPTIONS", "ARMING_SKIPCHK", "FENCE_ENABLE", "AVOID_ENABLE", "OA_TYPE"} <= {*ASKED}
+    assert {"FS_ACTION", "BATT_FS_LOW_ACT", "BATT_FS_CRT_ACT"} <= {*ASKED}
+    assert "FENCE_ACTION" in FENCE_ASKED
     assert {"SYSID_MYGCS", "SYSID_ENFORCE", "ARMING_CHECK", "GUID_TIMEOUT"} <= {*ASKED}
