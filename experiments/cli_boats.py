@@ -33,7 +33,8 @@ from .deploy.dashboard import Dashboard
 from .deploy.demo import Demo, demo_file, end_with_parent
 from .deploy.keys import figure_rows
 from .deploy.orders import Orders, Outcome, Surface
-from .deploy.plain import PlainLines, logging_aside
+from .deploy.plain import PlainLines
+from .deploy.quiet import logging_aside
 from .deploy.referee import RATE_HZ, Referee
 from .deploy.rules import game_config
 from .deploy.run import deploy as run_boats

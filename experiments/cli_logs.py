@@ -27,9 +27,9 @@ from .deploy.demo import end_with_parent
 from .deploy.replay import as_content, compare, draw, replay_log, show
 from .fit.fitting import best_of, fit_runs, platform_file, results_of
 from .fit.models import MODELS
-from .fit.plot import draw as draw_fit
 from .fit.reading import read_logs
-from .fit.words import about_the_boat, promise
+from .fit.report import about_the_boat, promise
+from .fit.report import draw as draw_fit
 from .play.spec import check_seed
 from .provenance import head_of
 from .replay_html import write_replay

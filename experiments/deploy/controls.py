@@ -8,7 +8,8 @@ import os
 import select
 import sys
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
+from typing import Any
 
 from steerclear.shield.bridge.clock import Clock
 from steerclear.shield.bridge.failsafe_table import DISABLES
@@ -20,6 +21,8 @@ try:
     import termios
 except ImportError:  # not a Unix: no key is read, Ctrl-C still ends the run
     termios = None  # type: ignore[assignment]
+
+logger = logging.getLogger(__name__)
 
 STOP_KEYS = (" ", "s", "S")
 BY = "keyboard"
@@ -35,6 +38,9 @@ TITLES = {
     "duration": "{condition} of {whom}: for how long? It disables {disabled}",
 }
 """What each menu asks."""
+OPENS = {"o": "condition", "t": "take"}
+WAIT_S = 0.1
+_NO_KEY = b"\x00"
 
 
 class Controls:
@@ -42,17 +48,10 @@ class Controls:
 
     Once boats are told to stop through the shield, a stop key asks whether they are to stop past it. Only another key
     answers that: no double tap and no key held down drops the shield.
-
-    Args:
-        fleet: the file.
-        operator: gets what keys ask for.
-        clock: the loop's.
     """
 
     def __init__(self, fleet: FleetFile, operator: Operator, clock: Clock) -> None:
         self._operator, self._clock = operator, clock
-        self._names = fleet.names
-        self._ours = tuple(boat.name for boat in fleet.ours if boat.link is not None and boat.commanded)
         self._lock = threading.Lock()
         self._open = self._condition = self._subject = self._said = ""
         self._confirmed: dict[str, Callable[[], object]] = {
@@ -60,20 +59,34 @@ class Controls:
             "resume": lambda: operator.resume(BY),
             "take_sure": lambda: operator.take_back(self._subject, BY),
         }
+        ours = [boat.name for boat in fleet.ours if boat.link is not None and boat.commanded]
+        options: dict[str, Iterable[Any]] = {
+            "take": ours,
+            "condition": DISABLES,
+            "subject": ("all", *fleet.names),
+            "duration": DURATIONS_S,
+        }
+        self._options = {menu: dict(zip(DIGITS, entries, strict=False)) for menu, entries in options.items()}
 
     def press(self, key: str) -> None:
         """Act on a key; keys that mean nothing are ignored."""
         with self._lock:
+            asked, self._open = self._open, ""
             if key in STOP_KEYS:
-                self._stop()
-            elif self._open in self._confirmed:
-                asked, self._open = self._open, ""
+                if not self._operator.stopped:
+                    self._operator.stop_all(BY)
+                elif not self._operator.hard:
+                    self._open = "hard"
+                else:
+                    self._open = asked
+            elif asked in self._confirmed:
                 if key in ("y", "Y"):
                     self._confirmed[asked]()
-            elif self._open:
-                self._choose(key)
+            elif asked:
+                if key in self._options[asked]:
+                    self._choose(asked, self._options[asked][key])
             else:
-                self._command(key)
+                self._command(key.lower())
 
     def menu(self) -> list[str]:
         """Lines of the open menu; empty: none is open."""
@@ -81,70 +94,36 @@ class Controls:
             if not self._open:
                 return []
             parts = {"condition": self._condition, "subject": self._subject, "whom": self._subject or "all"}
-            title = TITLES[self._open].format(**parts, disabled=DISABLES.get(self._condition, ""))
-            return [title, *self._entries(), *([self._said] if self._said else [])]
-
-    def _stop(self) -> None:
-        if not self._operator.stopped:
-            self._open = ""
-            self._operator.stop_all(BY)
-        elif not self._operator.hard:
-            self._open = "hard"
+            lines = [TITLES[self._open].format(**parts, disabled=DISABLES.get(self._condition, ""))]
+            options = self._options.get(self._open, {})
+            if self._open == "condition":
+                lines += [f" {key} {name}: disables {DISABLES[name]}" for key, name in options.items()]
+            elif options:
+                seconds = self._open == "duration"
+                lines.append("   ".join(f"{key} {f'{one:g} s' if seconds else one}" for key, one in options.items()))
+            return [*lines, *([self._said] if self._said else [])]
 
     def _command(self, key: str) -> None:
         self._said = ""
-        if key in ("q", "Q"):
+        if key == "q":
             self._operator.end(BY)
-        elif key in ("r", "R") and self._operator.stopped:
+        elif key == "r" and self._operator.stopped:
             self._open = "resume"
-        elif key in ("o", "O"):
-            self._open = "condition"
-        elif key in ("t", "T"):
-            self._open = "take"
-
-    def _choose(self, key: str) -> None:
-        options, menu = self._options(), self._open
-        self._open = ""
-        if key not in DIGITS[: len(options)]:
-            return
-        chosen = options[DIGITS.index(key)]
-        if menu == "take":
-            self._subject, self._open = chosen, "take_sure"
-        elif menu == "condition":
-            self._condition, self._open = chosen, "subject"
-        elif menu == "subject":
-            self._subject, self._open = "" if chosen == "all" else chosen, "duration"
         else:
-            self._override(float(chosen))
+            self._open = OPENS.get(key, "")
 
-    def _override(self, seconds: float) -> None:
-        try:
-            self._operator.override(self._condition, self._subject, seconds, self._clock.now_s(), BY)
-        except ConfigError as error:
-            self._open, self._said = "condition", str(error)
-
-    def _options(self) -> Sequence[str]:
-        return {
-            "take": self._ours[: len(DIGITS)],
-            "condition": tuple(DISABLES),
-            "subject": ("all", *self._names)[: len(DIGITS)],
-            "duration": tuple(f"{seconds:g}" for seconds in DURATIONS_S),
-        }.get(self._open, ())
-
-    def _entries(self) -> list[str]:
-        options = self._options()
-        if self._open == "condition":
-            return [f" {key} {name}: disables {DISABLES[name]}" for key, name in zip(DIGITS, options, strict=False)]
-        unit = " s" if self._open == "duration" else ""
-        line = "   ".join(f"{key} {name}{unit}" for key, name in zip(DIGITS, options, strict=False))
-        return [line] if line else []
-
-
-logger = logging.getLogger(__name__)
-
-WAIT_S = 0.1
-ESCAPE = "\x1b"
-_NO_KEY = b"\x00"
+    def _choose(self, menu: str, chosen: str | float) -> None:
+        if menu == "take":
+            self._subject, self._open = str(chosen), "take_sure"
+        elif menu == "condition":
+            self._condition, self._open = str(chosen), "subject"
+        elif menu == "subject":
+            self._subject, self._open = "" if chosen == "all" else str(chosen), "duration"
+        else:
+            try:
+                self._operator.override(self._condition, self._subject, float(chosen), self._clock.now_s(), BY)
+            except ConfigError as error:
+                self._open, self._said = "condition", str(error)
 
 
 class Keyboard:
@@ -156,16 +135,20 @@ class Keyboard:
     Args:
         pressed: called with each key, one character; what it raises is logged.
         descriptor: of the terminal; None: standard input.
+
+    Attributes:
+        is_terminal: whether keys can come at all.
     """
 
     def __init__(self, pressed: Callable[[str], None], descriptor: int | None = None) -> None:
         self._pressed = pressed
         self._closing = threading.Event()
-        self._descriptor = _standard_input() if descriptor is None else descriptor
-        self._before: list[object] | None = None
-        self.is_terminal = self._descriptor is not None and os.isatty(self._descriptor) and termios is not None
-        """Whether keys can come at all."""
-        self._thread = threading.Thread(target=self._listen, name="keys", daemon=True)
+        if descriptor is None:
+            with contextlib.suppress(OSError, ValueError, AttributeError):
+                descriptor = sys.stdin.fileno()
+        self._before: list[Any] | None = None
+        self.is_terminal = descriptor is not None and os.isatty(descriptor) and termios is not None
+        self._thread = threading.Thread(target=self._listen, args=(descriptor,), name="keys", daemon=True)
         if self.is_terminal:
             self._thread.start()
         elif termios is None:
@@ -177,10 +160,7 @@ class Keyboard:
         if self._thread.is_alive() and threading.current_thread() is not self._thread:
             self._thread.join(timeout=2.0)
 
-    def _listen(self) -> None:
-        descriptor = self._descriptor
-        if descriptor is None:
-            return
+    def _listen(self, descriptor: int) -> None:
         try:
             while not self._closing.is_set():
                 if not _in_foreground(descriptor):
@@ -192,15 +172,16 @@ class Keyboard:
                     data = os.read(descriptor, 256)
                     if not data:
                         return
-                    self._press(data)
+                    self._press(data.decode(errors="replace"))
         except (OSError, termios.error) as error:  # the terminal was closed
             logger.warning("no more keys from the terminal (%s); stop with Ctrl-C or SIGTERM", error)
         finally:
-            self._give_back(descriptor)
+            with contextlib.suppress(OSError, termios.error):
+                if self._before is not None and _in_foreground(descriptor):
+                    termios.tcsetattr(descriptor, termios.TCSANOW, self._before)
 
-    def _press(self, data: bytes) -> None:
-        text = data.decode(errors="replace")
-        if text.startswith(ESCAPE) and len(text) > 1:
+    def _press(self, text: str) -> None:
+        if text.startswith("\x1b") and len(text) > 1:
             return  # an arrow or function key
         for key in text:
             try:
@@ -214,26 +195,13 @@ class Keyboard:
         Ctrl-Z would stop the process, and with it the shield; Ctrl-S would freeze the picture. Both are taken away.
         """
         present = termios.tcgetattr(descriptor)
-        if self._before is None:
-            self._before = termios.tcgetattr(descriptor)
+        self._before = self._before or termios.tcgetattr(descriptor)
         if present[3] & (termios.ICANON | termios.ECHO):
             present[0] &= ~(termios.IXON | termios.ICRNL)
             present[3] &= ~(termios.ICANON | termios.ECHO)
             for key, value in ((termios.VMIN, 1), (termios.VTIME, 0), (termios.VSUSP, _NO_KEY)):
                 present[6][key] = value
             termios.tcsetattr(descriptor, termios.TCSANOW, present)
-
-    def _give_back(self, descriptor: int) -> None:
-        with contextlib.suppress(OSError, termios.error):
-            if self._before is not None and _in_foreground(descriptor):
-                termios.tcsetattr(descriptor, termios.TCSANOW, self._before)
-
-
-def _standard_input() -> int | None:
-    try:
-        return sys.stdin.fileno()
-    except (OSError, ValueError, AttributeError):
-        return None
 
 
 def _in_foreground(descriptor: int) -> bool:

@@ -32,14 +32,12 @@ LATE_OF = 100
 class Dashboard:
     """A `TickSink` that shows the latest tick, and takes keys. A thread draws, another listens to the keyboard.
 
-    It draws when a tick has come, so while the loop rests till the next, and when a key was pressed.
-
-    Keys act at once and do not wait for the picture; when drawing fails, they go on.
+    It draws when a tick has come, so while the loop rests till the next, and when a key was pressed. Keys act at once
+    and do not wait for the picture; when drawing fails, they go on.
 
     Args:
-        fleet: the file.
+        fleet, clock: the loop's.
         operator: gets what the keys ask for.
-        clock: the loop's.
         console: where to draw; None: standard output.
         keyboard: descriptor of the terminal that keys come from; None: standard input.
         refresh_hz: pictures a second, at most.
@@ -94,7 +92,7 @@ class Dashboard:
             ended=self._operator.ended,
             late_s=(sum(late_s) / len(late_s), max(late_s)),
             menu=self._controls.menu(),
-            log=self._log.latest(),
+            log=list(self._log.lines)[-LOG_LINES:],
         )
 
     def close(self) -> None:
@@ -108,7 +106,7 @@ class Dashboard:
         atexit.unregister(self.close)
         if self._thread.is_alive():
             return  # the terminal takes nothing any more; what would be written now would wait for ever
-        for line in self._log.kept():
+        for line in self._log.lines:
             self._console.print(line, markup=False, soft_wrap=True)
 
     def _draw(self) -> None:
@@ -130,20 +128,13 @@ class LogLines(logging.Handler):
     def __init__(self) -> None:
         super().__init__(logging.INFO)
         self.setFormatter(SafeFormatter("%(asctime)s %(levelname)s %(message)s", "%H:%M:%S"))
-        self._lines: deque[str] = deque(maxlen=200)
+        self.lines: deque[str] = deque(maxlen=200)
+        """The latest lines; older ones are gone."""
         self._aside: list[logging.Handler] = []
 
     def emit(self, record: logging.LogRecord) -> None:
         """Keep a line."""
-        self._lines.append(self.format(record).replace("\n", " | "))
-
-    def latest(self) -> list[str]:
-        """The last lines."""
-        return list(self._lines)[-LOG_LINES:]
-
-    def kept(self) -> list[str]:
-        """All lines kept; the oldest may be gone."""
-        return list(self._lines)
+        self.lines.append(self.format(record).replace("\n", " | "))
 
     def __enter__(self) -> LogLines:
         root = logging.getLogger()

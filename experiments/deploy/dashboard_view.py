@@ -7,38 +7,139 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from rich.console import Group, RenderableType
+from rich.console import Console, ConsoleOptions, Group, RenderableType
 from rich.layout import Layout
 from rich.table import Table
 from rich.text import Text
 from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.messages import BoatReading, Contact, Tick
-from steerclear.shield.decision import Decision
+from steerclear.shield.decision import Decision, Reason
 from steerclear.shield.fleet import Fleet
-from steerclear.shield.jit import Array
 
-from .dashboard_lines import BANNERS, COLUMNS, DROPPED, GROWING, KEYS, MARKS, WHY
-from .dashboard_map import COLOURS, Drawing, FieldMap
+from .dashboard_map import COLOURS, SYMBOLS, FieldMap
 
+MOST_ACTIONS = 6
+"""Responses in effect that are told in words."""
 LOOK_AHEAD_S = 60.0
 """Approaches later than this are not looked for."""
+SILENT_S = 1.0
+"""A loop without a tick for so long is shown as standing still."""
+
+COLUMNS = {
+    "boat": (10, "its name in its team's colour, and its marks"),
+    "hdg": (4, "heading, degrees clockwise from the field's y axis"),
+    "m/s": (5, "speed"),
+    "age": (5, "seconds since its position was true; red: older than the limit"),
+    "wanted": (9, "what the policy, or a response, wants: speed m/s and heading"),
+    "sent": (9, "what the shield made of it, as it left; cyan: changed by the shield"),
+    "why": (9, "why the shield sent that, see below; red: the mode that keeps it from obeying"),
+    "margin": (6, "how much more room than required its best manoeuvre keeps, m; red: less than required"),
+    "closest": (14, "whom it meets closest when all hold course, how near and when; yellow: too near"),
+    "bound by": (12, "what its command had to give way to"),
+}
+"""Of the table: characters that the longest cell needs, and meaning."""
+GROWING = (("closest", 26), ("boat", 16), ("bound by", 24), ("closest", 400))
+"""Where room that is left over goes, in this order, each up to a width."""
+DROPPED = ("bound by", "hdg", "m/s", "age", "closest", "why", "margin")
+"""What is left out of a terminal too narrow for all, in this order; wanted and sent stand in every one, whole."""
+WHY = {
+    Reason.PASSED: ("passed", "green", "the nominal command leaves the boat a way out: sent as it is"),
+    Reason.LEAST_CHANGE: ("least", "cyan", "changed as little as it takes to keep clear of everything"),
+    Reason.QP_RELAXED: ("QP slack", "yellow", "of logs of 0.2.0 and before"),
+    Reason.BACKUP: ("backup", "yellow", "its backup manoeuvre, which keeps clear of all boats"),
+    Reason.BEST_EFFORT: (
+        "best eff.",
+        "bold red",
+        "no manoeuvre keeps the margin, this one most of it: give it room, or SPACE",
+    ),
+    Reason.HELD: ("held", "magenta", "the nominal command is unusable: told to stop on its course"),
+    Reason.NOT_COVERED: ("-", "dim", "this shield does not decide for the boat"),
+    Reason.RIGHT_OF_WAY: ("way", "cyan", "two teammates kept each other from turning: one gives way, one stands on"),
+    Reason.LIMITED: ("limit", "yellow", "more speed was asked than the boat can do"),
+    Reason.STOPPED: (
+        "stopped",
+        "bold red",
+        "beyond the hard line, or a shore too near: its link's own stop; bring it in by hand",
+    ),
+}
+MARKS = (("⚑", "has_flag", "carries the flag"), ("T", "tagged", "tagged"), ("O", "oob", "out of bounds"))
+_RED = "bold white on red"
+BANNERS = {
+    "soft": (
+        "STOP ALL by {0}: boats are told to stop through the shield (again, then y: past it); r resumes",
+        _RED,
+        "boats stop and the shield still keeps them clear; `r`, then `y`, lets the policy go on",
+    ),
+    "hard": (
+        "STOP ALL by {0}: boats are told to stop by their links, past the shield; r resumes",
+        _RED,
+        "nothing keeps boats clear of each other: take them by hand, or `r` and `y`",
+    ),
+    "ended": (
+        "The run ends ({0}): boats are left stopped",
+        "bold black on yellow",
+        "wait until each boat is told to be in HOLD; get others off the water",
+    ),
+    "nothing": ("Nothing yet", "black on yellow", "no turn of the loop yet: wait"),
+    "silent": (
+        "The loop stands still: no tick for {0:.1f} s",
+        _RED,
+        "the runner is stuck; each boat stops by itself 3 s after the last command it heard: take them by hand",
+    ),
+    "unknown": (
+        "No boat's state is known: boats are told to stop",
+        _RED,
+        "telemetry of all our boats is gone: their links stop them; look at radios and feed",
+    ),
+    "effect": (
+        "{0} in effect, see below",
+        "black on yellow",
+        "a fault was answered; the lines below say which boat, what is done, and how control returns",
+    ),
+    "fine": ("All within limits", "black on green", "nothing is declared: go on"),
+}
+"""The line that says how things stand: words, style, what it means and what to do."""
+KEYS = (
+    ("SPACE or s", "STOP ALL", "all boats stop behind the shield; again, then `y`: by their links, past it"),
+    ("r", "resume", "take STOP ALL back, after a question"),
+    ("o", "overrides", "switch one response off for a time, for one boat or all"),
+    ("t", "take back", "take a boat back that its pilot let go of, after a question"),
+    ("q", "end", "stop all boats and end the run"),
+)
+KEY_LINE = "   ".join(f"{key} {words}" for key, words, _ in KEYS)
+HEAD = (
+    ("tick N", "turns of the loop so far"),
+    ("N s, blue A : B red", "the referee's clock and score; *no referee*: nobody keeps the game"),
+    ("policy N", "seconds since the policy's answer was right; beyond `limits.policy` a response is due"),
+    ("late N ms, at most M", "how much later than due the last 100 turns began, on average and at most"),
+)
 
 
-@dataclass(frozen=True)
-class Approach:
-    """Two boats and their closest approach.
+def dashboard_page() -> str:
+    """What every line of the dashboard means, for the operator's page, in Markdown."""
+    parts = {
+        "first line": HEAD,
+        "banner": [
+            (words.format("...") if "{0:" not in words else words.partition(":")[0], meaning)
+            for words, _, meaning in BANNERS.values()
+        ],
+        "map": SYMBOLS,
+        "table of boats": [(title, meaning) for title, (_, meaning) in COLUMNS.items()],
+        "mark beside a name": [(mark, meaning) for mark, _, meaning in MARKS],
+        "why": [(words, meaning) for words, _, meaning in WHY.values()],
+        "key": [(key, f"{words}: {meaning}") for key, words, meaning in KEYS],
+    }
+    rows = [f"| {part} | {what} | {meaning} |" for part, lines in parts.items() for what, meaning in lines]
+    return "\n".join(["| where | it shows | what it means, and what to do |", "|---|---|---|", *rows])
 
-    Attributes:
-        boat, other: names.
-        distance_m: now, m.
-        closest_m: least distance within `LOOK_AHEAD_S`, m.
-        in_s: time until then, s; 0 when they draw apart.
-    """
+
+class Approach(NamedTuple):
+    """The closest approach of a boat to another within `LOOK_AHEAD_S`: m now, m then, s until then (0: they part)."""
 
     boat: str
     other: str
@@ -49,75 +150,20 @@ class Approach:
 
 def approaches(fleet: Fleet) -> dict[str, Approach]:
     """The closest approach of each controlled boat to any other, by its name; none without another boat."""
-    velocity = fleet.speed_mps[:, None] * np.stack([np.sin(fleet.heading_rad), np.cos(fleet.heading_rad)], axis=1)
+    velocity = fleet.speed_mps[:, None] * np.column_stack([np.sin(fleet.heading_rad), np.cos(fleet.heading_rad)])
     found = {}
-    for i in np.flatnonzero(fleet.controlled):
-        pairs = [_approach(fleet, velocity, int(i), j) for j in range(len(fleet)) if j != i]
-        if pairs:
-            found[fleet.names[i]] = min(pairs, key=lambda pair: (pair.closest_m, pair.distance_m))
-    return found
-
-
-def _approach(fleet: Fleet, velocity: Array, i: int, j: int) -> Approach:
-    apart = fleet.position_m[j] - fleet.position_m[i]
-    closing = velocity[j] - velocity[i]
-    square = float(closing @ closing)
-    in_s = 0.0 if square < 1e-9 else min(LOOK_AHEAD_S, max(0.0, -float(apart @ closing) / square))
-    closest = apart + in_s * closing
-    distance_m = math.hypot(*apart.tolist())
-    return Approach(fleet.names[i], fleet.names[j], distance_m, math.hypot(*closest.tolist()), in_s)
-
-
-WIDE = 150
-"""From this many columns on the table stands beside the map."""
-MOST_ACTIONS = 6
-SILENT_S = 1.0
-"""A loop without a tick for so long is shown as standing still."""
-GAP = 1
-"""Between columns of the table, characters."""
-
-
-BESIDE = sum(column.width + GAP for column in COLUMNS) + 12
-"""Width with every column: what the table has beside the map. Below it ``bound by`` is left out."""
-KEY_LINE = "   ".join(f"{key} {words}" for key, words, _ in KEYS)
-
-
-def fitting(width: int) -> dict[str, int]:
-    """Columns that a width has room for, with the width of each."""
-    widths = {column.title: column.width for column in COLUMNS if width >= BESIDE or column.title != "bound by"}
-    for title in DROPPED:
-        if sum(widths.values()) + GAP * len(widths) > width:
-            widths.pop(title, None)
-    left = width - sum(widths.values()) - GAP * len(widths)
-    for title, most in GROWING:
-        more = max(0, min(left, most - widths.get(title, most)))
-        if more:
-            widths[title] += more
-            left -= more
-    widths["boat"] = max(1, widths["boat"] + min(left, 0))  # a terminal too narrow for the least: names go first
-    return widths
-
-
-def boats_table(width: int, rows: list[Mapping[str, Any]]) -> Table:
-    """The table.
-
-    Args:
-        width: characters there are.
-        rows: cells by title; those left out are empty.
-    """
-    table = Table(box=None, padding=(0, GAP, 0, 0), pad_edge=False, width=max(1, width), header_style="bold")
-    widths = fitting(width)
-    for title, wide in widths.items():
-        table.add_column(
-            title,
-            width=wide,
-            no_wrap=True,
-            overflow="crop" if title in ("wanted", "sent") else "ellipsis",
-            justify="left" if title in ("boat", "why", "closest", "bound by") else "right",
+    for i in np.flatnonzero(fleet.controlled) if len(fleet) > 1 else ():
+        apart, closing = fleet.position_m - fleet.position_m[i], velocity - velocity[i]
+        square = (closing**2).sum(axis=1)
+        in_s = np.clip(-(apart * closing).sum(axis=1) / np.maximum(square, 1e-9), 0.0, LOOK_AHEAD_S)
+        in_s[square < 1e-9] = 0.0
+        now_m, then_m = np.hypot(*apart.T), np.hypot(*(apart + in_s[:, None] * closing).T)
+        now_m[i] = then_m[i] = np.inf
+        j = int(np.lexsort((now_m, then_m))[0])
+        found[fleet.names[i]] = Approach(
+            fleet.names[i], fleet.names[j], float(now_m[j]), float(then_m[j]), float(in_s[j])
         )
-    for row in rows:
-        table.add_row(*(row.get(title, "") for title in widths))
-    return table
+    return found
 
 
 @dataclass(frozen=True)
@@ -144,13 +190,24 @@ class Moment:
     menu: Sequence[str] = ()
     log: Sequence[str] = ()
 
+    def banner(self) -> tuple[str, tuple[Any, ...]]:
+        """Which of `BANNERS` stands there, and what is filled in: the worst that is so."""
+        if self.stopped:
+            return "hard" if self.hard else "soft", (self.stopped,)
+        if self.ended:
+            return "ended", (self.ended,)
+        if self.tick is None:
+            return "nothing", ()
+        if (silent_s := self.now_s - self.tick.began_s) > SILENT_S:
+            return "silent", (silent_s,)
+        if self.tick.fleet is None:
+            return "unknown", ()
+        count = len(self.tick.actions)
+        return ("effect", (f"{count} response{'s' if count > 1 else ''}",)) if count else ("fine", ())
+
 
 class View:
-    """Shows moments of one run.
-
-    Args:
-        fleet: the file.
-    """
+    """Shows moments of one run."""
 
     def __init__(self, fleet: FleetFile) -> None:
         self._fleet = fleet
@@ -158,58 +215,42 @@ class View:
 
     def of(self, moment: Moment, columns: int, rows: int) -> RenderableType:
         """The whole screen, so many characters large."""
-        lower = _lower(moment, columns)
-        height = len(lower) + 1
-        table_rows = len(self._fleet.boats) + 1
-        screen, body = Layout(), Layout(name="body")
-        drawing = Layout(Drawing(self._map, moment.tick), name="map", minimum_size=4)
-        if columns >= WIDE:
-            # the map takes what it can fill at this height, the table all the rest
-            useful = self._map.columns_for(moment.tick, max(4, rows - 2 - height))
-            drawing.size = min(useful, columns - BESIDE)
-            body.split_row(drawing, Layout(self._boats(moment, columns - drawing.size), name="boats"))
-        else:
-            boats = Layout(self._boats(moment, columns), name="boats")
-            boats.size = min(table_rows, max(4, rows - height - 8))
-            body.split_column(drawing, boats)
+        lower, screen = _lower(moment, columns), Layout()
         screen.split_column(
             Layout(self._head(moment), size=2),
-            body,
-            Layout(Group(*lower, Text(KEY_LINE, "reverse")), size=min(height, max(3, rows // 2))),
+            Layout(_Drawing(self._map, moment.tick), minimum_size=4),
+            Layout(self._boats(moment, columns), size=min(len(self._fleet.boats) + 1, max(4, rows - len(lower) - 9))),
+            Layout(Group(*lower, Text(KEY_LINE, "reverse")), size=min(len(lower) + 1, max(3, rows // 2))),
         )
         return screen
 
     def _head(self, moment: Moment) -> RenderableType:
-        tick = moment.tick
-        line = Text(f"steerclear, {self._fleet.team}", no_wrap=True, overflow="ellipsis")
+        tick, line = moment.tick, f"steerclear, {self._fleet.team}"
         if tick is not None:
-            line.append(f"   tick {tick.number}")
-            line.append(f"   {_score(tick.game)}")
-            line.append(f"   policy {_age(tick.policy_age_s)}")
-            line.append(f"   late {1e3 * moment.late_s[0]:.1f} ms, at most {1e3 * moment.late_s[1]:.1f}")
-        return Group(line, self._banner(moment))
-
-    def _banner(self, moment: Moment) -> Text:
-        name, values = _state(moment)
-        banner = BANNERS[name]
-        text = f" {banner.words.format(*values)}".ljust(500)
-        return Text(text, banner.style, no_wrap=True, overflow="crop")
+            late = f"late {1e3 * moment.late_s[0]:.1f} ms, at most {1e3 * moment.late_s[1]:.1f}"
+            line = "   ".join(
+                [line, f"tick {tick.number}", _score(tick.game), f"policy {_age(tick.policy_age_s)}", late]
+            )
+        name, values = moment.banner()
+        words, style, _ = BANNERS[name]
+        banner = Text(f" {words.format(*values)}".ljust(500), style, no_wrap=True, overflow="crop")
+        return Group(Text(line, no_wrap=True, overflow="ellipsis"), banner)
 
     def _boats(self, moment: Moment, width: int) -> Table:
         tick = moment.tick
         if tick is None:
             return boats_table(width, [])
-        rows = []
         contacts = {contact.boat: contact for contact in reversed(tick.contacts)}  # of several the first counts
         decisions = {} if tick.decisions is None else {decision.boat: decision for decision in tick.decisions}
         near = {} if tick.fleet is None else approaches(tick.fleet)
+        rows = []
         for boat in self._fleet.boats:
-            name: dict[str, Any] = {"boat": self._name(boat.name, tick.game)}
-            reading = tick.readings.get(boat.name)
+            name, reading = boat.name, tick.readings.get(boat.name)
             if reading is not None:
-                rows.append(name | _own(reading, decisions.get(boat.name), tick, self._near(near.get(boat.name))))
+                cells = _own(reading, decisions.get(name), tick, self._near(near.get(name)))
             else:
-                rows.append(name | _other(contacts.get(boat.name), moment.now_s, self._fleet.limits.contact.max_age_s))
+                cells = _other(contacts.get(name), moment.now_s, self._fleet.limits.contact.max_age_s)
+            rows.append({"boat": self._name(name, tick.game), **cells})
         return boats_table(width, rows)
 
     def _name(self, name: str, game: Mapping[str, Any]) -> Text:
@@ -223,91 +264,104 @@ class View:
             return Text("")
         limit = self._fleet.shield_config.separation_m
         style = "bold red" if approach.distance_m < limit else "yellow" if approach.closest_m < limit else ""
-        when = f" in {approach.in_s:.0f} s" if approach.in_s > 0.5 else " now"
-        return Text(f"{approach.other} {approach.closest_m:.1f} m{when}", style)
+        when = f"in {approach.in_s:.0f} s" if approach.in_s > 0.5 else "now"
+        return Text(f"{approach.other} {approach.closest_m:.1f} m {when}", style)
 
 
-def _state(moment: Moment) -> tuple[str, tuple[Any, ...]]:
-    """Which of `BANNERS` stands there, and what is filled in: the worst that is so."""
-    tick = moment.tick
-    if moment.stopped:
-        return "hard" if moment.hard else "soft", (moment.stopped,)
-    if moment.ended:
-        return "ended", (moment.ended,)
-    if tick is None:
-        return "nothing", ()
-    if moment.now_s - tick.began_s > SILENT_S:
-        return "silent", (moment.now_s - tick.began_s,)
-    if tick.fleet is None:
-        return "unknown", ()
-    count = len(tick.actions)
-    return ("effect", (f"{count} response{'s' if count > 1 else ''}",)) if count else ("fine", ())
+class _Drawing:
+    """A map as large as the place it is put in."""
+
+    def __init__(self, field_map: FieldMap, tick: Tick | None) -> None:
+        self._map, self._tick = field_map, tick
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Text]:
+        yield Text("\n").join(self._map.draw(self._tick, options.max_width, options.height or 16))
+
+
+def boats_table(width: int, rows: Sequence[Mapping[str, Any]]) -> Table:
+    """The table of boats, so many characters wide; ``rows``: cells by title, those left out are empty."""
+    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, width=max(1, width), header_style="bold")
+    widths = {title: needs for title, (needs, _) in COLUMNS.items()}
+    for title in DROPPED:
+        if sum(widths.values()) + len(widths) > width:
+            widths.pop(title, None)
+    left = width - sum(widths.values()) - len(widths)
+    for title, most in GROWING:
+        more = max(0, min(left, most - widths.get(title, most)))
+        widths |= {title: widths[title] + more} if more else {}
+        left -= more
+    widths["boat"] = max(1, widths["boat"] + min(left, 0))  # a terminal too narrow for the least: names go first
+    for title, wide in widths.items():
+        table.add_column(
+            title,
+            width=wide,
+            no_wrap=True,
+            overflow="crop" if title in ("wanted", "sent") else "ellipsis",
+            justify="left" if title in ("boat", "why", "closest", "bound by") else "right",
+        )
+    for row in rows:
+        table.add_row(*(row.get(title, "") for title in widths))
+    return table
 
 
 def _lower(moment: Moment, columns: int) -> list[Text]:
     """The open menu, or what is in effect and the end of the log; long lines are broken."""
-    if moment.menu:
-        return [line for text in moment.menu for line in _broken(text, "bold", columns)]
     actions = () if moment.tick is None else moment.tick.actions
-    lines = [
-        line
-        for action in actions[:MOST_ACTIONS]
-        for line in _broken(f"{action.subject}: {action.text}", "yellow", columns)
-    ]
+    texts = moment.menu or [f"{action.subject}: {action.text}" for action in actions[:MOST_ACTIONS]]
+    style = "bold" if moment.menu else "yellow"
+    pieces = [piece for text in texts for piece in textwrap.wrap(text, max(20, columns), subsequent_indent="   ")]
+    lines = [Text(piece, style, no_wrap=True, overflow="crop") for piece in pieces]
+    if moment.menu:
+        return lines
     if len(actions) > MOST_ACTIONS:
         lines.append(Text(f"and {len(actions) - MOST_ACTIONS} more", "yellow"))
     return lines + [Text(line, "dim", no_wrap=True, overflow="ellipsis") for line in moment.log]
 
 
-def _broken(text: str, style: str, columns: int) -> list[Text]:
-    pieces = textwrap.wrap(text, max(20, columns), subsequent_indent="   ") or [""]
-    return [Text(piece, style, no_wrap=True, overflow="crop") for piece in pieces]
-
-
 def _own(reading: BoatReading, decision: Decision | None, tick: Tick, near: Text) -> dict[str, Any]:
     """Cells of a boat of ours, by the column's title."""
     sent = tick.sent.get(reading.boat)
-    seen = _seen(reading.heading_rad, reading.speed_mps, Text(_age(reading.age_s)))
     sent_text = Text("-") if sent is None else Text(_command(sent.speed_mps, sent.heading_rad))
     if sent is not None and not sent.delivered:
         sent_text = Text("not sent", "bold red")
-    cells = {**seen, "wanted": "-", "sent": sent_text, "margin": "-", "closest": near}
+    cells = {**_seen(reading, Text(_age(reading.age_s))), "wanted": "-", "sent": sent_text, "margin": "-"}
     if not reading.ready:
-        mode = Text(reading.mode or "not ready", "bold red")
-        return {**cells, "why": mode, "closest": Text(reading.why_not, "red")}
+        return {**cells, "why": Text(reading.mode or "not ready", "bold red"), "closest": Text(reading.why_not, "red")}
     if decision is None:
-        return {**cells, "why": Text("undecided", "red")}
+        return {**cells, "why": Text("undecided", "red"), "closest": near}
     if decision.intervened:
         sent_text.stylize("bold cyan")
-    wanted = _command(decision.nominal_speed_mps, decision.nominal_heading_rad)
-    margin = Text("free" if decision.safety_margin_m == math.inf else f"{decision.safety_margin_m:.1f}")
-    if decision.safety_margin_m < 0.0:
-        margin.stylize("bold red")
-    why = {"why": Text(*WHY[decision.reason][:2]), "bound by": ", ".join(decision.active_constraints)}
-    return {**cells, "wanted": wanted, "margin": margin, **why}
+    margin_m = decision.safety_margin_m
+    return {
+        **cells,
+        "wanted": _command(decision.nominal_speed_mps, decision.nominal_heading_rad),
+        "margin": Text("free" if margin_m == math.inf else f"{margin_m:.1f}", "bold red" if margin_m < 0.0 else ""),
+        "why": Text(*WHY[decision.reason][:2]),
+        "closest": near,
+        "bound by": ", ".join(decision.active_constraints),
+    }
 
 
 def _other(contact: Contact | None, now_s: float, limit_s: float) -> dict[str, Any]:
     """Cells of another boat, by the column's title."""
     if contact is None:
-        return {**_seen(math.nan, math.nan, Text("never", "red")), "why": Text("not heard", "red")}
+        return {"hdg": "-", "m/s": "-", "age": Text("never", "red"), "why": Text("not heard", "red")}
     age_s = now_s - contact.fixed_s
-    age = Text(_age(age_s), "bold red" if age_s > limit_s else "")
     told = Text(f"by {contact.source}, error {contact.error_m:.1f} m", "dim")
-    return {**_seen(contact.heading_rad, contact.speed_mps, age), "why": Text("contact", "dim"), "closest": told}
+    age = Text(_age(age_s), "bold red" if age_s > limit_s else "")
+    return {**_seen(contact, age), "why": Text("contact", "dim"), "closest": told}
 
 
-def _seen(heading_rad: float, speed_mps: float, age: Text) -> dict[str, Any]:
-    return {"hdg": _heading(heading_rad), "m/s": _speed(speed_mps), "age": age}
+def _seen(boat: BoatReading | Contact, age: Text) -> dict[str, Any]:
+    speed = f"{boat.speed_mps:.2f}" if math.isfinite(boat.speed_mps) else "-"
+    return {"hdg": _heading(boat.heading_rad), "m/s": speed, "age": age}
 
 
 def _score(game: Mapping[str, Any]) -> str:
     if not game:
         return "no referee"
     blue, red = game.get("captures") or (0, 0)
-    text = f"{float(game.get('time_s') or 0.0):.0f} s, blue {blue} : {red} red"
-    if game.get("over"):
-        text += ", over"
+    text = f"{float(game.get('time_s') or 0.0):.0f} s, blue {blue} : {red} red{', over' if game.get('over') else ''}"
     return f"{text} ({game['note']})" if game.get("note") else text
 
 
@@ -319,10 +373,6 @@ def _age(age_s: float) -> str:
 
 def _heading(heading_rad: float) -> str:
     return f"{round(math.degrees(heading_rad)) % 360:03d}°" if math.isfinite(heading_rad) else "-"
-
-
-def _speed(speed_mps: float) -> str:
-    return f"{speed_mps:.2f}" if math.isfinite(speed_mps) else "-"
 
 
 def _command(speed_mps: float, heading_rad: float) -> str:

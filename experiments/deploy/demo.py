@@ -12,7 +12,6 @@ import threading
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import IO, BinaryIO
 
 from steerclear.experiments.sim_boats.demo import MOOS_PORTS, demo_text
@@ -20,34 +19,28 @@ from steerclear.shield.bridge.blackbox import log_path
 from steerclear.shield.compat import Self
 from steerclear.shield.exceptions import BridgeError
 
-GRACE_S = 3.0
-"""How long a program may take to end in order, s."""
+GRACE_S, END_S = 3.0, 10.0
+"""How long a program may take to end in order, s: one whose parent is gone, and one of a demonstration."""
 
 
 def end_with_parent(stream: BinaryIO | None = None) -> threading.Thread:
     """End this process in order (SIGTERM) when a stream is closed at its other end, at once `GRACE_S` later.
 
     Whoever starts a program with a pipe as its standard input holds the only other end: the system closes it also when
-    that process is killed with -9.
-
-    Args:
-        stream: the stream; None: standard input.
-
-    Returns:
-        The thread that waits for it.
+    that process is killed with -9. Without a stream that is what is watched. Returns the thread that waits for it.
     """
     watched = sys.stdin.buffer if stream is None else stream
-    thread = threading.Thread(target=_wait, args=(watched,), name="lifeline", daemon=True)
+
+    def wait() -> None:
+        while os.read(watched.fileno(), 4096):
+            pass
+        os.kill(os.getpid(), signal.SIGTERM)
+        threading.Event().wait(GRACE_S)
+        os._exit(1)
+
+    thread = threading.Thread(target=wait, name="lifeline", daemon=True)
     thread.start()
     return thread
-
-
-def _wait(stream: BinaryIO) -> None:
-    while os.read(stream.fileno(), 4096):
-        pass
-    os.kill(os.getpid(), signal.SIGTERM)
-    threading.Event().wait(GRACE_S)
-    os._exit(1)
 
 
 FOLDER = Path("steerclear_demo")
@@ -56,15 +49,11 @@ FOLDER = Path("steerclear_demo")
 PORTS = (14550, 14700, 14701)
 """Ports of the file that comes with the package: links, feed, referee."""
 
-END_S = 10.0
-
 
 def demo_file(folder: Path = FOLDER, link: str = "mavlink") -> Path:
     """The fleet file that comes with the package, on free ports, in a new folder where it can be looked at.
 
-    Args:
-        folder: in which the new one is made, named after the time, UTC.
-        link: what our boats run, mavlink or moos.
+    The folder is named after the time, UTC; ``link`` is what our boats run, mavlink or moos.
 
     Raises:
         BridgeError: it cannot be written.
@@ -90,11 +79,10 @@ def free_ports(count: int) -> list[int]:
     with contextlib.ExitStack() as stack:
         found: list[int] = []
         while len(found) < count:
-            port = int(stack.enter_context(socket.create_server(("127.0.0.1", 0))).getsockname()[1])
+            address = stack.enter_context(socket.create_server(("127.0.0.1", 0))).getsockname()
             with contextlib.suppress(OSError):
-                entry = stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
-                entry.bind(("127.0.0.1", port))
-                found.append(port)
+                stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)).bind(address)
+                found.append(int(address[1]))
         return found
 
 
@@ -110,13 +98,8 @@ def _new_folder(folder: Path) -> Path:
 class Demo:
     """Simulated boats of a fleet file, opponents and a referee. A context manager.
 
-    The processes end with this one, also when it is killed; what they say is kept beside the fleet file.
-
-    Args:
-        fleet_file: the file; its links must be on this machine.
-        opponents: policy of the other team.
-        speed: times faster than real time.
-        more: further options of ``sim-boats``.
+    The processes end with this one, also when it is killed; what they say is kept beside the fleet file, whose links
+    must be on this machine. ``opponents``: policy of the other team; ``more``: further options of ``sim-boats``.
 
     Raises:
         BridgeError: the processes cannot be started.
@@ -158,11 +141,7 @@ class Demo:
         return Path(self._files[name].name).read_text(encoding="utf-8", errors="replace").strip()
 
     def close(self, patience_s: float = END_S) -> None:
-        """End the processes, those that do not end in time at once; may be called again.
-
-        Args:
-            patience_s: how long each may take to end in order, s.
-        """
+        """End the processes, those that do not end in so long, s, at once; may be called again."""
         for process in self._processes.values():
             with contextlib.suppress(OSError):
                 process.terminate()
@@ -188,12 +167,9 @@ class Demo:
                 )
         except OSError as error:
             self.close()
-            raise BridgeError(
-                f"the demonstration cannot be started ({error}); run sim-boats and referee by hand"
-            ) from None
+            what = f"the demonstration cannot be started ({error}); run sim-boats and referee by hand"
+            raise BridgeError(what) from None
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()

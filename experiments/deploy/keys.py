@@ -7,20 +7,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import NamedTuple
 
 
-@dataclass(frozen=True)
-class Figure:
+class Figure(NamedTuple):
     """One figure of a run.
 
     Attributes:
         key: in results.
         meaning: what it is, with its unit, in a sentence without a full stop.
         label: words of the terminal's table; empty: it is not shown there.
-        factor: from its unit to the one that is shown.
-        unit: that is shown.
-        digits: that are shown.
+        factor, unit, digits: from its unit to the one that is shown, that one, and its digits.
     """
 
     key: str
@@ -30,12 +27,6 @@ class Figure:
     unit: str = ""
     digits: int = 0
 
-    def words(self, value: float) -> str:
-        """The value for a person; inf: nobody else was there."""
-        if math.isinf(value):
-            return "no other boat"
-        return f"{self.factor * value:.{self.digits}f} {self.unit}".strip()
-
 
 FIGURES = (
     Figure("ticks", "turns of the loop", "turns"),
@@ -43,10 +34,7 @@ FIGURES = (
     Figure(
         "changed_share",
         "share of own boats' commands that the shield changed, 0 to 1",
-        "commands changed by the shield",
-        100.0,
-        "%",
-        1,
+        *("commands changed by the shield", 100.0, "%", 1),
     ),
     Figure("best_effort_commands", "own boats' commands for which no manoeuvre kept the margin"),
     Figure(
@@ -57,10 +45,7 @@ FIGURES = (
     Figure(
         "closest_m",
         "closest approach of an own boat to any other, as believed, m",
-        "closest approach of our boats, as believed",
-        1.0,
-        "m",
-        2,
+        *("closest approach of our boats, as believed", 1.0, "m", 2),
     ),
     Figure("least_certificate_m", "smallest certificate of an own boat, m"),
     Figure("missed_turns", "turns left out because the loop was late", "turns missed"),
@@ -71,10 +56,7 @@ FIGURES = (
     Figure(
         "read_to_sent_p99_s",
         "the same, 99 of 100, s",
-        "telemetry read to command sent, 99 of 100 within",
-        1000.0,
-        "ms",
-        1,
+        *("telemetry read to command sent, 99 of 100 within", 1000.0, "ms", 1),
     ),
     Figure("read_to_sent_max_s", "the same, the worst, s"),
     Figure("decide_p99_s", "the shield's decision alone, 99 of 100, s"),
@@ -83,8 +65,12 @@ FIGURES = (
 
 
 def figure_rows(figures: Mapping[str, float]) -> list[tuple[str, str]]:
-    """The rows of the terminal's table: label and value."""
-    return [(entry.label, entry.words(figures[entry.key])) for entry in FIGURES if entry.label]
+    """The rows of the terminal's table: label and value; inf: nobody else was there."""
+    rows = [(one, figures[one.key]) for one in FIGURES if one.label]
+    return [
+        (one.label, "no other boat" if math.isinf(value) else f"{one.factor * value:.{one.digits}f} {one.unit}".strip())
+        for one, value in rows
+    ]
 
 
 DEPLOY = {

@@ -1,8 +1,7 @@
-"""What to run, what came of it, and the steps that `deploy` and `preflight` share."""
+"""What to run and what came of it; reading a fleet file so that what cannot be run is refused before any packet."""
 
 from __future__ import annotations
 
-import logging
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -16,7 +15,7 @@ from steerclear.shield.bridge.fleet_file import FleetFile, load_with_text
 from steerclear.shield.bridge.mavlink.signing import read_key
 from steerclear.shield.bridge.messages import TickSink
 from steerclear.shield.bridge.operator import Operator
-from steerclear.shield.bridge.preflight_checks import Check, CheckResult, not_passed, run_checks, validate_accepted
+from steerclear.shield.bridge.preflight_checks import CheckResult
 from steerclear.shield.bridge.session import CONNECT_S
 from steerclear.shield.bridge.static_obstacles import StaticObstacles
 from steerclear.shield.exceptions import BridgeError, ConfigError, FleetFileError, SteerclearError
@@ -26,18 +25,12 @@ from steerclear.shield.surroundings import Surroundings
 from .preflight_file import measured_delay_s
 from .rules import game_config, game_obstacles
 
-LOG = logging.getLogger(__name__)
-
 LONGEST_MINUTES = 120.0
 """Room for so long a log is asked for when no end is given."""
-
-LONGEST_WAIT_S = 3600.0
-"""Nobody means to wait longer for boats; more is a slip of the keyboard."""
-
-FASTEST = 1000.0
-"""Simulated boats live no faster, times real time."""
-
-Shown = Callable[[CheckResult], None]
+LONGEST_WAIT_S, FASTEST = 3600.0, 1000.0
+"""Nobody means to wait longer for boats, or simulates them faster: more is a slip of the keyboard."""
+APART_M = 100.0
+"""Boats of the rehearsal lie so far apart: only who they are counts."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +107,7 @@ class Surface:
         sinks: makes further sinks, such as a dashboard, once the run begins.
     """
 
-    shown: Shown = lambda result: None
+    shown: Callable[[CheckResult], None] = lambda result: None
     sinks: Callable[[FleetFile, Operator, Clock], Sequence[TickSink]] = lambda fleet, operator, clock: ()
 
 
@@ -128,85 +121,50 @@ def read_fleet(orders: Orders) -> tuple[FleetFile, str]:
     fleet, text = load_with_text(orders.fleet_file)
     if fleet.agent_ids:
         game_config(fleet)
-    if not fleet.commanded(orders.boat):
-        raise FleetFileError(f"{orders.fleet_file}: {_nothing_to_command(fleet)}")
+    commanded = fleet.commanded(orders.boat)
+    if not commanded:
+        nobodys = [b for b in fleet.boats if b.link and b.commanded and b.agent is None and b.team is None]
+        why = f"no boat of team {fleet.team} has a link; give one to command it"
+        if nobodys:
+            why = f"{nobodys[0].name} has a link but no agent or team; add team: {fleet.team} to command it"
+        raise FleetFileError(f"{orders.fleet_file}: {why}")
     if fleet.signing is not None:
         read_key(fleet.signing.key_file)
-    if "delay_s" not in fleet.shield:
-        fleet = fleet.with_shield(delay_s=_delay_s(fleet, orders.boat, orders.untold_delay_s))
-    return fleet, text
+    return with_delay(fleet, orders.boat, orders.untold_delay_s), text
 
 
-def _nothing_to_command(fleet: FleetFile) -> str:
-    """Why, and what to do: a boat outside the game is nobody's until its team is said."""
-    for boat in fleet.boats:
-        if boat.link is not None and boat.commanded and boat.agent is None and boat.team is None:
-            return f"{boat.name} has a link but no agent or team; add team: {fleet.team} to command it"
-    return f"no boat of team {fleet.team} has a link; give one to command it"
-
-
-def _delay_s(fleet: FleetFile, boat: str | None, untold_s: float | None = None) -> float:
-    """What the last drill measured, else the longest that the platforms' files say, see `Orders.untold_delay_s`."""
-    drilled = measured_delay_s(fleet, boat)
-    if drilled is not None:
-        return drilled
-    told = [fleet.measured_of(entry.name).get("delay_s", 0.0) for entry in fleet.commanded(boat)]
-    return max(fleet.dt_s if untold_s is None else untold_s, *told)
-
-
-def check_accepted(checks: Sequence[Check], accept: Sequence[str], elsewhere: Sequence[str] = ()) -> None:
-    """See that every name to accept is a check's, before any is run.
-
-    Args:
-        checks: that will be run.
-        accept: names that may fail.
-        elsewhere: kinds of checks that are made in the drill and may be accepted too.
-
-    Raises:
-        ConfigError: a name is no check's.
-    """
-    known = [*checks, *(Check(kind, lambda: CheckResult("", False, "")) for kind in elsewhere)]
-    validate_accepted([name for name in accept if name.split(":")[0] not in elsewhere], known)
-
-
-def may_start(checks: Sequence[Check], accept: Sequence[str], surface: Surface, outcome: Outcome) -> bool:
-    """Run checks; whether they allow to go on.
-
-    Args:
-        checks: to run.
-        accept: names that may fail, see `check_accepted`.
-        surface: where results are shown.
-        outcome: gets results and refusals.
-    """
-    outcome.checks = run_checks(checks, surface.shown)
-    outcome.refused = not_passed(outcome.checks, accept)
-    for result in outcome.checks:
-        if not result.passed and result not in outcome.refused:
-            LOG.warning("accepted although not passed: %s: %s", result.name, result.text)
-    return not outcome.refused
-
-
-APART_M = 100.0
-"""Boats of the rehearsal lie so far apart: only who they are counts."""
+def with_delay(fleet: FleetFile, boat: str | None = None, untold_s: float | None = None) -> FleetFile:
+    """The file with a delay: its own, else what the last drill measured, else the longest that its platforms say."""
+    if "delay_s" in fleet.shield:
+        return fleet
+    delay_s = measured_delay_s(fleet, boat)
+    if delay_s is None:
+        fitted = [fleet.measured_of(entry.name).get("delay_s", 0.0) for entry in fleet.commanded(boat)]
+        delay_s = max(fleet.dt_s if untold_s is None else untold_s, *fitted)
+    return fleet.with_shield(delay_s=delay_s)
 
 
 def refuse_early(fleet: FleetFile) -> None:
-    """See that a run of this file can begin, before anything is sent to a boat.
+    """See that a run of this file can begin, and its logs be written, before anything is sent to a boat.
 
     Raises:
         FleetFileError: as `rehearse`, or the game's rules make no sense.
-        BridgeError: as `check_log_folder`.
+        BridgeError: the folder of the logs cannot be made, or takes no file; what is wrong and what to do.
     """
     rehearse(fleet, game_obstacles(fleet))
-    check_log_folder(fleet.log_dir)
+    try:
+        fleet.log_dir.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=fleet.log_dir) as file:
+            file.write(b"steerclear")
+            file.flush()
+    except OSError as error:
+        raise BridgeError(f"cannot write logs into {fleet.log_dir}: {explain(error)}") from None
 
 
 def rehearse(fleet: FleetFile, fixed: Surroundings) -> None:
     """Build all that the loop will build of a file, once, as it will be at its first turn.
 
-    Args:
-        fleet: the file, with its measured delay.
-        fixed: static constraints of the game, see `rules.game_obstacles`.
+    ``fixed`` are static constraints of the game, see `rules.game_obstacles`.
 
     Raises:
         FleetFileError: the shield's settings leave nothing of the water, or it would refuse these boats.
@@ -229,18 +187,3 @@ def boats_of(fleet: FleetFile) -> Fleet:
         controlled=np.array([name in ours for name in fleet.names]),
         names=fleet.names,
     )
-
-
-def check_log_folder(folder: Path) -> None:
-    """Make the folder of the logs, and see that it takes a file.
-
-    Raises:
-        BridgeError: it cannot be made or written; what is wrong and what to do.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder) as file:
-            file.write(b"steerclear")
-            file.flush()
-    except OSError as error:
-        raise BridgeError(f"cannot write logs into {folder}: {explain(error)}") from None

@@ -1,11 +1,22 @@
-"""A policy that plays on what the loop saw, in a process of its own: the game as it sees it, and its answers."""
+"""A policy that plays on what the loop saw, in a process of its own: the game as it sees it, and its answers.
+
+The process is forked by `entries.sandbox`, which ends it when the runner is gone. It reads pickled `Orders`, then
+snapshots, and answers JSON.
+"""
 
 from __future__ import annotations
 
 import dataclasses
+import json
+import math
+import os
+import pickle
+import threading
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from multiprocessing.connection import Connection
+from typing import Any, NamedTuple
 
 import numpy as np
 from steerclear import policies
@@ -16,7 +27,7 @@ from steerclear.policies.actions import HOLD, ActionReader
 from steerclear.shield.bridge.feed import GameState, game_state
 from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.messages import Snapshot
-from steerclear.shield.exceptions import FleetError, FleetFileError, PolicyError
+from steerclear.shield.exceptions import FleetError, FleetFileError, PolicyError, SteerclearError
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.usv import wrap_degrees
@@ -28,6 +39,10 @@ NEED_NO_GAME = ("hold", "random", "waypoints")
 NOBODY = -1
 RESTART_S = 1.0
 """A game whose clock goes back by more than this is a new one."""
+FAILED = 3
+"""Exit status when the policy could not be loaded; the answer before it says why."""
+GRACE_S = 5.0
+"""Time the supervisor has to end this process once the runner is gone, s."""
 
 
 @dataclass(frozen=True)
@@ -52,14 +67,9 @@ class Cast:
         return tuple("" if row == NOBODY else self.names[row] for row in self.rows)
 
     @property
-    def there(self) -> list[int]:
-        """Numbers of the agents that have a boat."""
-        return [i for i, row in enumerate(self.rows) if row != NOBODY]
-
-    @property
-    def boats(self) -> list[int]:
-        """Numbers in ``names`` of their boats."""
-        return [row for row in self.rows if row != NOBODY]
+    def there(self) -> tuple[list[int], list[int]]:
+        """Numbers of the agents that have a boat, and in ``names`` of their boats."""
+        return [i for i, row in enumerate(self.rows) if row != NOBODY], [row for row in self.rows if row != NOBODY]
 
 
 def cast_of(fleet: FleetFile, boats: Sequence[str] | None = None, policy: str = "") -> Cast:
@@ -74,25 +84,19 @@ def cast_of(fleet: FleetFile, boats: Sequence[str] | None = None, policy: str = 
         FleetFileError: the file has no game and the policy needs one, or one of the boats does not play.
     """
     wanted = [boat.name for boat in fleet.commanded()] if boats is None else list(boats)
-    if not fleet.agent_ids and policy in NEED_NO_GAME:
-        return _without_game(fleet, wanted)
-    if not fleet.agent_ids:
+    if fleet.agent_ids:
+        ours = tuple(boat.agent for boat in map(fleet.boat, wanted) if boat.agent is not None)
+        rows = tuple(i for i, boat in enumerate(fleet.boats) if boat.agent is not None)
+        return Cast(game_config(fleet), fleet.names, rows, ours)
+    if policy not in NEED_NO_GAME:
         raise FleetFileError(
             f"no boat plays and policy {policy!r} needs a game: give boats an agent: agent_0, agent_1, ..., blue "
             f"first; boats without a game are steered by --policy {' or '.join(NEED_NO_GAME)}"
         )
-    config = game_config(fleet)
-    ours = tuple(boat.agent for boat in map(fleet.boat, wanted) if boat.agent is not None)
-    rows = tuple(i for i, boat in enumerate(fleet.boats) if boat.agent is not None)
-    return Cast(config, fleet.names, rows, ours)
-
-
-def _without_game(fleet: FleetFile, boats: Sequence[str]) -> Cast:
-    config = stand_in_config(fleet, boats)
-    ours, nobody = tuple(fleet.names.index(name) for name in boats), (NOBODY,) * len(boats)
-    first = len(boats) * fleet.team_number
-    agents = tuple(config.agent_ids[first : first + len(boats)])
-    return Cast(config, fleet.names, ours + nobody if first == 0 else nobody + ours, agents)
+    config, count = stand_in_config(fleet, wanted), len(wanted)
+    own, nobody = tuple(fleet.names.index(name) for name in wanted), (NOBODY,) * count
+    agents = tuple(config.agent_ids[count * fleet.team_number :][:count])
+    return Cast(config, fleet.names, own + nobody if fleet.team_number == 0 else nobody + own, agents)
 
 
 class Observer:
@@ -100,9 +104,6 @@ class Observer:
 
     A boat never seen is shown at its start, tagged, at rest. Without word from a referee the game is as at its start.
     Speeds astern are shown as 0, since boats of the game have none.
-
-    Args:
-        cast: who plays.
     """
 
     def __init__(self, cast: Cast) -> None:
@@ -132,13 +133,14 @@ class Observer:
         state[~lost, L.X], state[~lost, L.Y] = seen[~lost, 0], seen[~lost, 1]
         state[~lost, L.HEADING] = [wrap_degrees(heading) for heading in seen[~lost, 2]]
         state[~lost, L.SPEED] = np.maximum(seen[~lost, 3], 0.0)
-        position = state[:, [L.X, L.Y]]
+        position, rules = state[:, [L.X, L.Y]], self.env.core.rules
+        sides = zip(rules.side_sign[rules.team], position, strict=True)
         view = dataclasses.replace(
             self._start,
             state=state,
             previous_position=position if begins or self._positions is None else self._positions,
             is_tagged=lost,
-            on_side=self._sides(position),
+            on_side=np.array([is_on_side(rules.scrimmage, sign, *place) for sign, place in sides]),
             time_s=time_s,
         )
         self.env.core.restore(view if game is None else self._with_game(view, game, lost))
@@ -147,8 +149,7 @@ class Observer:
 
     def observations(self) -> dict[str, np.ndarray]:
         """Observations of all agents, as `MctfEnv.step` answers them."""
-        rows = self.env.core.observe()[0].copy()
-        return {agent_id: rows[i] for i, agent_id in enumerate(self.env.possible_agents)}
+        return dict(zip(self.env.possible_agents, self.env.core.observe()[0].copy(), strict=True))
 
     def infos(self) -> dict[str, dict[str, Any]]:
         """Infos of all agents, as `MctfEnv.step` answers them."""
@@ -159,31 +160,25 @@ class Observer:
         if seen.shape != (len(self.cast.names), 4):
             raise FleetError(f"seen has shape {seen.shape}; give ({len(self.cast.names)}, 4), a row per boat")
         rows = np.full((len(self.cast.rows), 4), np.nan)
-        rows[self.cast.there] = seen[self.cast.boats]
+        agents, boats = self.cast.there
+        rows[agents] = seen[boats]
         rows[~np.isfinite(rows).all(axis=1)] = np.nan
         return rows
 
-    def _sides(self, position: Array) -> Array:
-        rules = self.env.core.rules
-        sides = [is_on_side(rules.scrimmage, rules.side_sign[rules.team[i]], x, y) for i, (x, y) in enumerate(position)]
-        return np.array(sides, dtype=np.bool_)
-
     def _with_game(self, view: Any, game: GameState, lost: Array) -> Any:
         """The view with the referee's word; a flag carried by a boat in sight is where that boat is."""
-        arrays = {
-            name: np.array(getattr(view, name))
-            for name in ("is_tagged", "has_flag", "oob", "on_side", "driven", "tagging_cooldown_s")
-        }
+        told = {"is_tagged": "tagged", "tagging_cooldown_s": "cooldown_s"}
+        told |= {name: name for name in ("has_flag", "oob", "on_side", "driven")}
+        arrays = {name: np.array(getattr(view, name)) for name in told}
         for i, name in enumerate(self.cast.players):
             status = game.boats.get(name)
-            if status is None or lost[i]:
-                continue
-            arrays["is_tagged"][i], arrays["has_flag"][i] = status.tagged, status.has_flag
-            arrays["oob"][i], arrays["on_side"][i] = status.oob, status.on_side
-            arrays["driven"][i] = status.driven
-            arrays["tagging_cooldown_s"][i] = min(status.cooldown_s, self.cast.config.tagging_cooldown_s)
+            if status is not None and not lost[i]:
+                for array, key in told.items():
+                    arrays[array][i] = getattr(status, key)
+        cooldown = arrays["tagging_cooldown_s"]
+        np.minimum(cooldown, self.cast.config.tagging_cooldown_s, out=cooldown)
         flags = np.array([(flag.x_m, flag.y_m) for flag in game.flags])
-        for i in np.flatnonzero(arrays["has_flag"]):
+        for i in map(int, np.flatnonzero(arrays["has_flag"])):
             flags[1 - view.team[i]] = view.state[i, [L.X, L.Y]]
         counts = {name: np.array(getattr(game, name), dtype=np.int64) for name in ("captures", "grabs", "tags")}
         taken = np.array([flag.taken for flag in game.flags])
@@ -209,8 +204,7 @@ class Orders:
     seed: int = 0
 
 
-@dataclass(frozen=True)
-class Play:
+class Play(NamedTuple):
     """A policy's answer to one snapshot.
 
     Attributes:
@@ -230,9 +224,6 @@ class Play:
 
 class Player:
     """A policy in the game that snapshots show, with the game's own drive home of tagged and out-of-bounds boats.
-
-    Args:
-        orders: what to play.
 
     Raises:
         PolicyError: the policy is unknown, cannot be loaded, or cannot play this game.
@@ -266,16 +257,20 @@ class Player:
         if self.observer.show(snapshot) and self._cast.ours:
             self._begin()
         actions, problems = self._ask() if self._cast.ours else ({}, {})
-        core = self.observer.env.core
-        wanted = self.observer.env.decode(actions)
-        relative: Array = core.commands(wanted[np.newaxis])[0]
-        driven = core.driven[0].copy()
-        for i, agent_id in enumerate(self.observer.env.possible_agents):
+        env = self.observer.env
+        relative: Array = env.core.commands(env.decode(actions)[np.newaxis])[0]
+        driven = env.core.driven[0].copy()
+        for i, agent_id in enumerate(env.possible_agents):
             if agent_id not in self._cast.ours or (agent_id in problems and not driven[i]):
                 relative[i] = np.nan
-        names = dict(zip(self.observer.env.possible_agents, self._cast.players, strict=True))
+        names = dict(zip(env.possible_agents, self._cast.players, strict=True))
         texts = tuple(f"{names[agent_id]}: {text}" for agent_id, text in problems.items())
-        return Play(relative, driven, self._absolute(relative), texts)
+        commands = np.full((len(self._cast.names), 2), np.nan)
+        headings_rad = np.radians((env.core.state[0, :, L.HEADING] + relative[:, 1]) % 360.0)
+        speeds_mps = np.clip(relative[:, 0], -env.core.max_speed_mps, env.core.max_speed_mps)
+        agents, boats = self._cast.there
+        commands[boats] = np.column_stack([speeds_mps, headings_rad])[agents]
+        return Play(relative, driven, commands, texts)
 
     def close(self) -> None:
         """Let the policy give back what it holds."""
@@ -288,12 +283,12 @@ class Player:
 
     def _ask(self) -> tuple[dict[str, Any], dict[str, str]]:
         """Actions of our agents, a stop for those without a usable one, and what was wrong with these."""
+        ours = self._cast.ours
         try:
             answer = self.policy.act(self.observer.observations(), self.observer.infos())
-            actions = {agent_id: answer[agent_id] for agent_id in self._cast.ours}
+            actions = {agent_id: answer[agent_id] for agent_id in ours}
         except (Exception, SystemExit) as error:  # foreign code may raise anything, and call exit()
-            text = f"raised {type(error).__name__}: {' '.join(str(error).split())[:200]}"
-            return dict.fromkeys(self._cast.ours, HOLD), dict.fromkeys(self._cast.ours, text)
+            return dict.fromkeys(ours, HOLD), dict.fromkeys(ours, f"raised {_line(error, 200)}")
         problems = dict(getattr(self.policy, "held", {}))
         for agent_id, action in actions.items():
             found = self._reader.problem(agent_id, action)
@@ -301,14 +296,6 @@ class Player:
                 problems[agent_id] = f"{found[0]}: {found[1]}"
                 actions[agent_id] = HOLD
         return actions, problems
-
-    def _absolute(self, relative: Array) -> Array:
-        core = self.observer.env.core
-        commands = np.full((len(self._cast.names), 2), np.nan)
-        headings_rad = np.radians((core.state[0, :, L.HEADING] + relative[:, 1]) % 360.0)
-        speeds_mps = np.clip(relative[:, 0], -core.max_speed_mps, core.max_speed_mps)
-        commands[self._cast.boats] = np.column_stack([speeds_mps, headings_rad])[self._cast.there]
-        return commands
 
 
 def load_player(orders: Orders) -> Player:
@@ -323,6 +310,64 @@ def load_player(orders: Orders) -> Player:
     except PolicyError:
         raise
     except (Exception, SystemExit) as error:
-        said = " ".join(str(error).split())[:300]
-        raise PolicyError(f"policy {orders.policy!r} cannot be loaded: {type(error).__name__}: {said}") from error
+        raise PolicyError(f"policy {orders.policy!r} cannot be loaded: {_line(error)}") from error
     return player
+
+
+def _line(error: BaseException, most: int = 300) -> str:
+    return f"{type(error).__name__}: {' '.join(str(error).split())[:most]}"
+
+
+class Latest:
+    """The latest snapshot, received by a thread, so that a slow policy skips those it was too late for."""
+
+    def __init__(self, snapshots: Connection) -> None:
+        self._snapshots = snapshots
+        self._ready = threading.Condition()
+        self._message = b""
+        threading.Thread(target=self._receive, name="snapshots", daemon=True).start()
+
+    def take(self) -> bytes:
+        """The latest message not taken yet, waiting for it."""
+        with self._ready:
+            self._ready.wait_for(lambda: self._message)
+            message, self._message = self._message, b""
+        return message
+
+    def _receive(self) -> None:
+        while True:
+            try:
+                message = self._snapshots.recv_bytes()
+            except (OSError, EOFError):
+                time.sleep(GRACE_S)  # the runner is gone, and the supervisor ends all this, whatever the policy is at
+                os._exit(0)
+            with self._ready:
+                self._message = message
+                self._ready.notify()
+
+
+def serve(read_fd: int, write_fd: int, folder: str) -> int:
+    """Load the policy the first message names and answer snapshots until the runner is gone."""
+    snapshots, answers = Connection(read_fd, writable=False), Connection(write_fd, readable=False)
+
+    def answer(**content: Any) -> None:
+        answers.send_bytes(json.dumps(content, allow_nan=False).encode())
+
+    try:
+        player = load_player(pickle.loads(snapshots.recv_bytes()))
+    except EOFError:
+        return 0
+    except SteerclearError as error:
+        answer(failed=str(error))
+        return FAILED
+    answer(ready=True)
+    latest = Latest(snapshots)
+    while True:
+        snapshot = pickle.loads(latest.take())
+        try:
+            play = player.play(snapshot)
+        except (SteerclearError, SystemExit) as error:
+            answer(number=snapshot.number, commands=None, problems=[_line(error)])
+            continue
+        rows = [row if math.isfinite(row[0]) else None for row in play.commands.tolist()]
+        answer(number=snapshot.number, commands=rows, problems=list(play.problems))

@@ -12,7 +12,6 @@ import pickle
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -56,6 +55,11 @@ class PolicyProcess:
         seed: of what the policy draws.
         start_within_s: time it has to load, s of the machine.
 
+    Attributes:
+        policy: its short name, for messages.
+        restarts: how often it was started again.
+        refused: why it could not be loaded at the last start; empty: it could.
+
     Raises:
         FleetFileError: the file has no game and the policy needs one, or one of the boats does not play.
     """
@@ -73,27 +77,21 @@ class PolicyProcess:
         start_within_s: float = START_WITHIN_S,
     ) -> None:
         self.policy = Path(policy).name if looks_like_path(policy) else policy
-        """Its short name, for messages."""
         self._orders = pickle.dumps(Orders(cast_of(fleet, boats, policy), policy, dict(options or {}), seed))
         self._shape = (len(fleet.names), 2)
         self._deadline_s = fleet.limits.policy.give_up_after_s if deadline_s is None else deadline_s
         self._start_within_s = start_within_s
         self._clock: Clock = MonotonicClock() if clock is None else clock
         self._worker: Worker | None = None
-        self._buried: list[Worker] = []
+        self._ended: list[Worker] = []
         self._ready = self._answered = self._closed = False
         self._pending: Snapshot | None = None
         self._asked: Snapshot | None = None
-        self._since_s = self._again_s = -math.inf
-        self._pause_s = FIRST_PAUSE_S
-        self._healthy_s = math.inf
+        self._since_s = self._again_s = self._taken_s = -math.inf
+        self._healthy_s, self._pause_s = math.inf, FIRST_PAUSE_S
         self._commands: Commands | None = None
-        self._taken_s = -math.inf
-        self._fault = ""
+        self._fault = self.refused = ""
         self.restarts = 0
-        """How often the policy was started again."""
-        self.refused = ""
-        """Why the policy could not be loaded at the last start; empty: it could."""
 
     def start(self) -> None:
         """Start the policy and wait until it is loaded; the only call that waits. Without it, `offer` starts it.
@@ -108,7 +106,7 @@ class PolicyProcess:
             self._turn()
             late = time.monotonic() > end_s
             if self._worker is None or late:
-                said = self.refused or (f"not within {self._start_within_s:g} s" if late else self._fault)
+                said = f"not within {self._start_within_s:g} s" if late else self._fault
                 self.close()
                 raise PolicyError(self.refused or f"policy {self.policy!r} does not start: {said}")
 
@@ -122,43 +120,45 @@ class PolicyProcess:
         self._turn()
         return Answer(self._commands, self._clock.now_s() - self._taken_s, self._present_fault())
 
-    def output(self) -> str:
-        """The end of what the policy printed."""
-        return "" if self._worker is None else self._worker.output()
-
     def close(self) -> None:
         """End the policy's process; may be called again."""
         self._closed = True
-        self._bury()
-        for worker in self._buried:
+        self._end()
+        for worker in self._ended:
             worker.wait(2.0)
-        self._buried.clear()
+        self._ended.clear()
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _turn(self) -> None:
-        if self._closed:
+        now_s, worker = time.monotonic(), self._worker
+        self._ended = [ended for ended in self._ended if not ended.is_gone]
+        if self._closed or (worker is None and now_s < self._again_s):
             return
-        now_s = time.monotonic()
-        self._buried = [worker for worker in self._buried if not worker.is_gone]
-        if self._worker is None:
-            if now_s >= self._again_s:
-                self._launch()
+        if worker is None:
+            self._launch()
             return
         try:
-            for message in self._worker.messages():
+            for message in worker.messages():
                 self._take(message, now_s)
-            self._show(now_s)
+            worker.flush()
+            if self._ready and self._asked is None and self._pending is not None:
+                worker.send(pickle.dumps(self._pending))
+                self._asked, self._pending, self._since_s = self._pending, None, now_s
         except Broken as error:
-            self._lose(self._worker.epitaph(str(error)), now_s)
+            self._lose(worker.epitaph(str(error)), now_s)
             return
-        self._check_time(now_s)
+        waited_s = now_s - self._since_s
+        if not self._ready and waited_s > self._start_within_s:
+            self._lose(f"did not load within {self._start_within_s:g} s", now_s)
+        elif self._asked is not None and waited_s > (self._deadline_s if self._answered else self._start_within_s):
+            self._lose(f"did not answer within {self._deadline_s:g} s", now_s)
+        elif now_s - self._healthy_s > HEALTHY_S:
+            self._pause_s = FIRST_PAUSE_S
 
     def _launch(self) -> None:
         now_s = time.monotonic()
@@ -167,12 +167,16 @@ class PolicyProcess:
         except (OSError, Broken) as error:
             self._lose(f"cannot be started ({error})", now_s)
             return
-        self._ready = self._answered = False
-        self._asked = None
+        self._ready, self._answered, self._asked = False, False, None
         self._since_s, self._healthy_s = now_s, math.inf
 
     def _take(self, message: bytes, now_s: float) -> None:
-        content = _content(message)
+        try:
+            content = json.loads(message)
+        except (ValueError, RecursionError):
+            raise Broken("its answer is not JSON") from None
+        if not isinstance(content, dict):
+            raise Broken("its answer is no object")
         if "failed" in content:
             self.refused = str(content["failed"])[:500]
             raise Broken(self.refused)
@@ -182,37 +186,16 @@ class PolicyProcess:
         asked = self._asked
         if asked is None or content.get("number") != asked.number:
             raise Broken("it answers what it was not asked")
-        self._asked = None
-        self._answered = True
+        self._asked, self._answered = None, True
         self._healthy_s = min(self._healthy_s, now_s)
-        problems = content.get("problems")
+        problems, rows = content.get("problems"), content.get("commands")
         self._fault = "; ".join(map(str, problems))[:300] if isinstance(problems, list) else ""
-        rows = _commands(content.get("commands"), self._shape)
         if rows is not None:
-            self._commands, self._taken_s = Commands.absolute_rad(rows), asked.taken_s
-
-    def _show(self, now_s: float) -> None:
-        worker = self._worker
-        if worker is None:
-            return
-        worker.flush()
-        if self._ready and self._asked is None and self._pending is not None:
-            worker.send(pickle.dumps(self._pending))
-            self._asked, self._pending = self._pending, None
-            self._since_s = now_s
-
-    def _check_time(self, now_s: float) -> None:
-        waited_s = now_s - self._since_s
-        if not self._ready and waited_s > self._start_within_s:
-            self._lose(f"did not load within {self._start_within_s:g} s", now_s)
-        elif self._asked is not None and waited_s > (self._deadline_s if self._answered else self._start_within_s):
-            self._lose(f"did not answer within {self._deadline_s:g} s", now_s)
-        elif now_s - self._healthy_s > HEALTHY_S:
-            self._pause_s = FIRST_PAUSE_S
+            self._commands, self._taken_s = Commands.absolute_rad(_commands(rows, self._shape)), asked.taken_s
 
     def _lose(self, what: str, now_s: float) -> None:
         """The process is of no use any more: end it and start another after a pause."""
-        self._bury()
+        self._end()
         self._ready = False
         self._fault = f"policy {self.policy} {what}; starting it again after {self._pause_s:g} s"
         self._again_s = now_s + self._pause_s
@@ -220,11 +203,11 @@ class PolicyProcess:
         self.restarts += 1
         logger.warning("%s", self._fault)
 
-    def _bury(self) -> None:
+    def _end(self) -> None:
         """End the present process; it is asked for again until the system has taken it."""
         if self._worker is not None:
             self._worker.end()
-            self._buried.append(self._worker)
+            self._ended.append(self._worker)
             self._worker = None
 
     def _present_fault(self) -> str:
@@ -239,20 +222,8 @@ class PolicyProcess:
         return self._fault
 
 
-def _content(message: bytes) -> Mapping[str, Any]:
-    try:
-        content = json.loads(message)
-    except (ValueError, RecursionError):
-        raise Broken("its answer is not JSON") from None
-    if not isinstance(content, dict):
-        raise Broken("its answer is no object")
-    return content
-
-
-def _commands(rows: Any, shape: tuple[int, int]) -> Array | None:
-    """Commands (n, 2) of an answer, NaN where it has none; None: it has none for any boat."""
-    if rows is None:
-        return None
+def _commands(rows: Any, shape: tuple[int, int]) -> Array:
+    """Commands (n, 2) of an answer, NaN where it has none."""
     try:
         values = np.array([[math.nan, math.nan] if row is None else row for row in rows], dtype=np.float64)
     except (TypeError, ValueError):

@@ -6,10 +6,11 @@ import hashlib
 import logging
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict, FiniteFloat, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError
 from steerclear.shield.bridge.drill import counted_words
 from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.preflight_checks import CheckResult
@@ -19,60 +20,39 @@ LOG = logging.getLogger(__name__)
 
 VALID_S = 12.0 * 3600.0
 """A drill counts for a day on the water, s."""
-
 DRILLED = ("course", "response", "model")
 """Checks that only a drill can make."""
-
-
-class KeptCheck(BaseModel):
-    """One check's result, as kept."""
-
-    model_config = ConfigDict(strict=True)
-
-    name: str
-    passed: bool
-    text: str
-    figures: dict[str, FiniteFloat]
 
 
 class Kept(BaseModel):
     """A preflight.
 
     Attributes:
-        fleet: fingerprint of the fleet file's text.
+        fleet: fingerprint of the fleet file's text: a changed file wants a new drill.
         unix_s: when it ended, s since 1970.
         refused: names of checks neither passed nor accepted.
         checks: all results.
     """
 
-    model_config = ConfigDict(strict=True)
+    model_config = ConfigDict(strict=True, allow_inf_nan=False)
 
     fleet: str
-    unix_s: FiniteFloat
+    unix_s: float
     refused: list[str]
-    checks: list[KeptCheck]
-
-
-def fingerprint(text: str) -> str:
-    """Of a fleet file's text: a changed file wants a new drill."""
-    return hashlib.sha256(text.encode()).hexdigest()
+    checks: list[CheckResult]
 
 
 def keep(fleet: FleetFile, text: str, boat: str | None, results: Sequence[CheckResult], refused: Sequence[str]) -> Path:
-    """Write what was found.
-
-    Args:
-        fleet: the file.
-        text: its text.
-        boat: whose process it was; None: the team's.
-        results: of all checks.
-        refused: names of those neither passed nor accepted.
+    """Write what all checks found, for the process of a boat, or of the team, and the text of its file.
 
     Raises:
         BridgeError: it cannot be written.
     """
-    checks = [KeptCheck(name=r.name, passed=r.passed, text=r.text, figures=_finite(r.figures)) for r in results]
-    kept = Kept(fleet=fingerprint(text), unix_s=time.time(), refused=list(refused), checks=checks)
+    checks = [
+        replace(one, figures={name: float(value) for name, value in one.figures.items() if math.isfinite(value)})
+        for one in results
+    ]
+    kept = Kept(fleet=_fingerprint(text), unix_s=time.time(), refused=list(refused), checks=checks)
     path = path_of(fleet, boat)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -97,7 +77,8 @@ def check_drill(
         return CheckResult("drill", False, f"{why}; run steerclear preflight first")
     texts = {check.name: check.text for check in found.checks}
     for name in found.refused:
-        if name in texts and name.split(":")[0] in DRILLED and not {name, name.split(":")[0]} & set(accept):
+        kind = name.split(":")[0]
+        if name in texts and kind in DRILLED and not {name, kind} & set(accept):
             return CheckResult("drill", False, f"{name}: {texts[name]}")
     delay = measured_delay_s(fleet, boat)
     counted = counted_words(fleet.shield_config.delay_s, fleet.dt_s)
@@ -109,13 +90,18 @@ def check_drill(
 def measured_delay_s(fleet: FleetFile, boat: str | None) -> float | None:
     """Longest delay from command to effect that the drill measured, s; None: none was."""
     found = _read(path_of(fleet, boat))
-    responses = [] if found is None else [c for c in found.checks if c.name.startswith("response:")]
-    return max((check.figures["delay_s"] for check in responses if "delay_s" in check.figures), default=None)
+    checks = () if found is None else found.checks
+    delays = [check.figures.get("delay_s") for check in checks if check.name.startswith("response:")]
+    return max((delay for delay in delays if delay is not None), default=None)
+
+
+def _fingerprint(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _outdated(found: Kept, text: str, commanded: Sequence[str]) -> str:
     """Why a preflight does not count for these boats now; empty: it does."""
-    if found.fleet != fingerprint(text):
+    if found.fleet != _fingerprint(text):
         return "the fleet file has changed since its preflight"
     age_s = time.time() - found.unix_s
     if not 0.0 <= age_s <= VALID_S:
@@ -134,7 +120,3 @@ def _read(path: Path) -> Kept | None:
         why = error.errors()[0]["msg"] if isinstance(error, ValidationError) else error
         LOG.warning("%s cannot be read (%s); it counts as missing", path, why)
     return None
-
-
-def _finite(figures: Mapping[str, float]) -> dict[str, float]:
-    return {name: float(value) for name, value in figures.items() if math.isfinite(value)}

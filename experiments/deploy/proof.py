@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from steerclear.shield import Decisions, Shield, SteerclearError
@@ -15,32 +15,22 @@ from steerclear.shield.bridge.mavlink.commands import CREEP_MPS, VelocityRoute
 from steerclear.shield.bridge.messages import Sent, Tick
 from steerclear.shield.decision import Reason
 
-ROUNDED_MPS, ROUNDED_RAD = 1e-5, 1e-5
-"""Messages hold numbers of 32 bits: 1e-7 of a speed and of a turn; a little more is granted."""
+ROUNDED = 1e-5
+"""Messages hold numbers of 32 bits: 1e-7 of a speed and of a turn; a little more is granted, m/s or rad."""
 OWN_STOP = "send"
 """Condition of the action that declares that a link used its own stop for a boat that was decided for; where the shield
 decides `Reason.STOPPED`, the decision asks for it itself."""
+FIELDS = ("intervened", "reason", "safety_margin_m", "slack_m", "bound")
+"""Arrays of a decision that are compared, beside the sent commands; the time it took is not."""
 
 
-@dataclass(frozen=True)
-class Strayed:
-    """A command that does not rest on what was decided.
-
-    Attributes:
-        boat: whose.
-        what: which value.
-        decided, sent: the two, m/s or rad; None: there is none.
-    """
+class Strayed(NamedTuple):
+    """A command that does not rest on what was decided: m/s or rad; None: nothing was decided, or nothing sent."""
 
     boat: str
     what: str
     decided: float | None
     sent: float | None
-
-    @property
-    def is_unfounded(self) -> bool:
-        """Whether the log holds no decision for it: then nothing is proved, but nothing contradicts itself."""
-        return self.decided is None
 
 
 class SentCheck:
@@ -52,9 +42,6 @@ class SentCheck:
 
     Attributes:
         cut: how many commands an autopilot's limit cut, by boat and limit, m/s.
-
-    Args:
-        header: of the log.
     """
 
     def __init__(self, header: LogHeader) -> None:
@@ -64,7 +51,11 @@ class SentCheck:
 
     def strayed(self, tick: Tick) -> list[Strayed]:
         """What does not fit in a tick."""
-        decided = _decided(tick)
+        decided = {}
+        if tick.decisions is not None:
+            fleet, filtered = tick.decisions.fleet, tick.decisions.filtered
+            for i in np.flatnonzero(fleet.controlled):
+                decided[fleet.names[i]] = filtered.absolute(int(i), float(fleet.heading_rad[i]))
         names = dict.fromkeys((*self._ours, *tick.sent, *(decided if self._is_team else ())))
         found = [self._one(name, tick, decided.get(name)) for name in names]
         return [entry for entry in found if entry is not None]
@@ -78,69 +69,34 @@ class SentCheck:
         if _stops(sent) and _declares_stop(tick, name):
             return None
         speed_mps, heading_rad = decided
-        if not _are_alike(sent.heading_rad, heading_rad):
+        off_rad = sent.heading_rad - heading_rad
+        if not (math.isfinite(off_rad) and abs(math.remainder(off_rad, 2.0 * math.pi)) <= ROUNDED):
             return Strayed(name, "heading", heading_rad, sent.heading_rad)
-        if not self._is_speed(sent, speed_mps):
-            return Strayed(name, "speed", speed_mps, sent.speed_mps)
-        return None
-
-    def _is_speed(self, sent: Sent, decided_mps: float) -> bool:
-        if sent.route == VelocityRoute.name:
-            decided_mps = max(CREEP_MPS, decided_mps)
-        allowed_mps = min(sent.limit_mps, max(-sent.limit_mps, decided_mps))
-        if abs(allowed_mps - decided_mps) > ROUNDED_MPS:
-            self.cut[sent.boat, sent.limit_mps] += 1
-        return abs(sent.speed_mps - allowed_mps) <= ROUNDED_MPS
-
-
-def _decided(tick: Tick) -> dict[str, tuple[float, float]]:
-    """Speed m/s and heading rad decided for each boat that the shield steered."""
-    if tick.decisions is None:
-        return {}
-    fleet, commands = tick.decisions.fleet, tick.decisions.filtered
-    return {
-        name: commands.absolute(i, float(fleet.heading_rad[i]))
-        for i, name in enumerate(fleet.names)
-        if fleet.controlled[i]
-    }
-
-
-def _are_alike(first_rad: float, second_rad: float) -> bool:
-    """Whether two headings are one, but for rounding; those that are not finite never are."""
-    apart_rad = first_rad - second_rad
-    return math.isfinite(apart_rad) and abs(math.remainder(apart_rad, 2.0 * math.pi)) <= ROUNDED_RAD
+        asked_mps = max(CREEP_MPS, speed_mps) if sent.route == VelocityRoute.name else speed_mps
+        allowed_mps = min(sent.limit_mps, max(-sent.limit_mps, asked_mps))
+        self.cut.update([(sent.boat, sent.limit_mps)] if abs(allowed_mps - asked_mps) > ROUNDED else [])
+        is_it = abs(sent.speed_mps - allowed_mps) <= ROUNDED
+        return None if is_it else Strayed(name, "speed", speed_mps, sent.speed_mps)
 
 
 def _stops(sent: Sent) -> bool:
     """Whether it is a link's own stop, or nothing left at all."""
     if math.isnan(sent.speed_mps):
         return not sent.delivered
-    return abs(sent.speed_mps) <= CREEP_MPS + ROUNDED_MPS
+    return abs(sent.speed_mps) <= CREEP_MPS + ROUNDED
 
 
 def _declares_stop(tick: Tick, name: str) -> bool:
     decisions = tick.decisions  # numbers are compared: those of a damaged log need be no reason's
-    stopped = decisions is not None and any(
-        boat == name and reason == Reason.STOPPED
-        for boat, reason in zip(decisions.fleet.names, decisions.reason.tolist(), strict=False)
-    )
-    return stopped or any((action.subject, action.condition) == (name, OWN_STOP) for action in tick.actions)
+    pairs = () if decisions is None else zip(decisions.fleet.names, decisions.reason.tolist(), strict=False)
+    declared = ((action.subject, action.condition) for action in tick.actions)
+    return (name, Reason.STOPPED) in pairs or (name, OWN_STOP) in declared
 
 
-FIELDS = ("intervened", "reason", "safety_margin_m", "slack_m", "bound")
-"""Arrays of a decision that are compared, beside the sent commands; the time it took is not."""
+class Difference(NamedTuple):
+    """Where a decision differs from the recorded one, or what was sent from it; values to the last bit.
 
-
-@dataclass(frozen=True)
-class Difference:
-    """Where a decision differs from the recorded one.
-
-    Attributes:
-        tick: its number.
-        time_s: since the log began, s.
-        boat: whose; "" when it is about all.
-        what: which value.
-        recorded, replayed: the two, to the last bit.
+    ``time_s`` counts since the log began; ``boat`` is "" when it is about all.
     """
 
     tick: int
@@ -191,8 +147,7 @@ class Proof:
     @property
     def proved(self) -> bool:
         """Whether every turn is proved: boats were decided for, all the same, none missing, and all that was sent."""
-        unproven = self.unproven or self.missing or self.unfounded
-        return self.holds and self.covered > 0 and not unproven
+        return self.holds and self.covered > 0 and not (self.unproven or self.missing or self.unfounded)
 
 
 class Prover:
@@ -200,26 +155,30 @@ class Prover:
 
     The shield remembers backups from tick to tick, so that after missing ticks its answer is only known again from the
     next reset on, or from the next change of the fleet's boats, which makes it forget as well.
-
-    Args:
-        header: of the log.
     """
 
     def __init__(self, header: LogHeader) -> None:
-        self.proof = Proof()
         self._header = header
         self._shield = Shield(header.config, header.surroundings)
         self._sent = SentCheck(header)
-        self.proof.cut = self._sent.cut
-        self._known = False
-        self._last: int | None = None
+        self.proof = Proof(cut=self._sent.cut)
+        self._known = True
+        self._last = -1
         self._boats: Any = None
 
     def add(self, tick: Tick) -> None:
         """Decide a tick again and compare; compare what was sent with what was decided."""
-        self._follow(tick)
-        for strayed in self._sent.strayed(tick):
-            self._stray(tick, strayed)
+        proof = self.proof
+        proof.ticks += 1
+        if tick.number != self._last + 1:
+            proof.missing.append((self._last, tick.number))
+            self._known, self._boats = False, None
+        self._last = tick.number
+        for one in self._sent.strayed(tick):
+            proof.strayed += one.decided is not None
+            proof.unfounded += one.decided is None
+            values = ["none" if value is None else exact(value) for value in (one.decided, one.sent)]
+            proof.first_sent = proof.first_sent or self._difference(tick, one.boat, one.what, *values)
         if tick.fleet is None or tick.wanted is None or tick.decisions is None:
             return
         boats = (tick.fleet.platforms, tick.fleet.names, tick.fleet.team.tobytes())
@@ -228,44 +187,25 @@ class Prover:
         if tick.shield_reset:
             self._shield.reset()
         difference = self._compare(tick, tick.decisions)
-        self.proof.decisions += 1
-        self.proof.covered += bool(tick.decisions.fleet.controlled.any())
-        if difference is None:
-            self.proof.same += 1
-        elif self._known:
-            self.proof.different += 1
-            self.proof.first = self.proof.first or difference
-        else:
-            self.proof.unproven += 1
-
-    def _stray(self, tick: Tick, strayed: Strayed) -> None:
-        self.proof.strayed += not strayed.is_unfounded
-        self.proof.unfounded += strayed.is_unfounded
-        if self.proof.first_sent is None:
-            decided, sent = ("none" if value is None else exact(value) for value in (strayed.decided, strayed.sent))
-            time_s = tick.began_s - self._header.clock_s
-            self.proof.first_sent = Difference(tick.number, time_s, strayed.boat, strayed.what, decided, sent)
-
-    def _follow(self, tick: Tick) -> None:
-        self.proof.ticks += 1
-        if self._last is None:
-            self._known = tick.number == 0
-            if tick.number != 0:
-                self.proof.missing.append((-1, tick.number))
-        elif tick.number != self._last + 1:
-            self.proof.missing.append((self._last, tick.number))
-            self._known, self._boats = False, None
-        self._last = tick.number
+        proof.decisions += 1
+        proof.covered += bool(tick.decisions.fleet.controlled.any())
+        proof.same += difference is None
+        proof.unproven += difference is not None and not self._known
+        if difference is not None and self._known:
+            proof.different += 1
+            proof.first = proof.first or difference
 
     def _compare(self, tick: Tick, recorded: Decisions) -> Difference | None:
-        time_s = tick.began_s - self._header.clock_s
         try:
             replayed = self._shield.decide(recorded.fleet, recorded.nominal, tick.surroundings)
         except SteerclearError as error:
-            return Difference(tick.number, time_s, "", "decision", "decided", f"refused: {error}")
+            return self._difference(tick, "", "decision", "decided", f"refused: {error}")
         for boat, what, a, b in _differing(recorded, replayed):
-            return Difference(tick.number, time_s, boat, what, exact(a), exact(b))
+            return self._difference(tick, boat, what, exact(a), exact(b))
         return None
+
+    def _difference(self, tick: Tick, *said: str) -> Difference:
+        return Difference(tick.number, tick.began_s - self._header.clock_s, *said)
 
 
 def prove(header: LogHeader, ticks: Iterable[Tick]) -> Proof:
@@ -283,10 +223,10 @@ def exact(value: Any) -> str:
 
 def _differing(recorded: Decisions, replayed: Decisions) -> Iterator[tuple[str, str, Any, Any]]:
     """Boat, name of the value and the two values, for every value that differs in a bit."""
-    if recorded.filtered.relative != replayed.filtered.relative:
-        yield "", "frame of the command", recorded.filtered.relative, replayed.filtered.relative
-    pairs = [("sent speed, m/s", recorded.filtered.values[:, 0], replayed.filtered.values[:, 0])]
-    pairs += [("sent heading", recorded.filtered.values[:, 1], replayed.filtered.values[:, 1])]
+    one, other = recorded.filtered, replayed.filtered
+    if one.relative != other.relative:
+        yield "", "frame of the command", one.relative, other.relative
+    pairs = [(f"sent {what}", one.values[:, k], other.values[:, k]) for k, what in enumerate(("speed, m/s", "heading"))]
     pairs += [(name, getattr(recorded, name), getattr(replayed, name)) for name in FIELDS]
     for name, a, b in pairs:
         for i in np.flatnonzero(_bits(a) != _bits(b)):

@@ -1,10 +1,13 @@
-"""What keeps a run in time and in order: compiling beforehand, few pauses, real-time priority, signals."""
+"""What keeps a run in time and in order: compiling beforehand, few pauses, signals, and logs that make nobody wait."""
 
 from __future__ import annotations
 
 import contextlib
 import gc
+import logging
+import logging.handlers
 import os
+import queue
 import signal
 import sys
 import threading
@@ -14,18 +17,24 @@ from types import FrameType
 from typing import Any
 
 from steerclear.shield import Shield
+from steerclear.shield.bridge.blackbox.disk import explain
 from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.operator import Operator
+from steerclear.shield.exceptions import BridgeError
 from steerclear.shield.platforms import fresh_state, step_boat
 
+from ..terminal import SafeFormatter
 from .orders import boats_of
 
 LOOP_FIRST, OTHERS_FIRST = 2, 1
 """Real-time priorities of the loop's thread and of the runner's others, where the system allows them: before all other
 programs. A nicer program still makes the loop wait for its turn, 18 ms at the load where this makes it 0.2 ms."""
-
 SWITCH_S = 0.0001
 """How long another thread may keep the interpreter from the loop, s."""
+ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+"""Signals that end a run in order; the last comes when a terminal or its connection is closed."""
+MOST_LINES = 10_000
+"""Lines of the log that may wait to be written; more are dropped."""
 
 
 def warm_up(fleet: FleetFile) -> None:
@@ -61,11 +70,16 @@ def before_others() -> Iterator[None]:
     The calling thread goes before the others of this process; where it may not, they stay behind it too. A thread that
     has more already keeps it, and each is given back what it had.
     """
-    own = threading.get_native_id()
-    before = {task: place for task in _tasks() if (place := _place(task)) is not None}
-    if own in before and _schedule(own, before[own][1], LOOP_FIRST):
-        for task in before.keys() - {own}:
-            _schedule(task, before[task][1], OTHERS_FIRST)
+    own, before = threading.get_native_id(), dict[int, tuple[int, int]]()
+    for task in sorted(_tasks(), key=lambda task: task != own):
+        with contextlib.suppress(OSError):  # it has ended, or this is a right that we have not
+            has = os.sched_getscheduler(task), os.sched_getparam(task).sched_priority
+            first = LOOP_FIRST if task == own else OTHERS_FIRST
+            if has[1] < first:
+                os.sched_setscheduler(task, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(first))
+            before[task] = has
+        if own not in before:
+            break
     try:
         yield
     finally:
@@ -76,33 +90,10 @@ def before_others() -> Iterator[None]:
                     break
 
 
-def _place(task: int) -> tuple[int, int] | None:
-    """Policy and real-time priority of a thread; None: it has ended."""
-    try:
-        return os.sched_getscheduler(task), os.sched_getparam(task).sched_priority
-    except OSError:
-        return None
-
-
-def _schedule(task: int, has: int, priority: int) -> bool:
-    """Let a thread have at least a real-time priority; processes and threads it starts have none. Whether it has it."""
-    if has >= priority:
-        return True
-    try:
-        os.sched_setscheduler(task, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(priority))
-    except OSError:  # a right that few have; without it all goes on as it is
-        return False
-    return True
-
-
 def _tasks() -> list[int]:
     """Numbers of this process's threads, where the system tells them."""
     folder = Path("/proc/self/task")
     return [int(task.name) for task in folder.iterdir()] if folder.is_dir() else []
-
-
-ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
-"""Signals that end a run in order; the last comes when a terminal or its connection is closed."""
 
 
 @contextlib.contextmanager
@@ -123,3 +114,49 @@ def ended_by_signals(operator: Operator) -> Iterator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+@contextlib.contextmanager
+def logging_aside(path: Path | None, shown: bool) -> Iterator[None]:
+    """Write the log to a file, and to standard error when ``shown``, from a thread of its own.
+
+    Whatever a disk or a terminal does, logging costs the loop no time. The file is left only where something was
+    logged: warnings and failures; what happened in a run is in its black box.
+
+    Raises:
+        BridgeError: the file cannot be made.
+    """
+    handlers: list[logging.Handler] = [logging.StreamHandler()] if shown else []
+    if path is not None:
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            handlers.append(logging.FileHandler(path, encoding="utf-8"))
+        except OSError as error:
+            raise BridgeError(f"cannot begin the log {path}: {explain(error)}") from None
+    for handler in handlers:
+        handler.setFormatter(SafeFormatter("%(asctime)s %(levelname)s %(message)s"))
+    root, line = logging.getLogger(), _Dropping(queue.Queue(MOST_LINES))
+    listener = logging.handlers.QueueListener(line.queue, *handlers)
+    before = root.level
+    root.addHandler(line)
+    root.setLevel(logging.INFO)
+    listener.start()
+    try:
+        yield
+    finally:
+        root.removeHandler(line)
+        root.setLevel(before)
+        listener.stop()
+        for handler in handlers:
+            handler.close()
+        with contextlib.suppress(OSError):
+            if path is not None and path.stat().st_size == 0:
+                path.unlink()  # nothing had to be said
+
+
+class _Dropping(logging.handlers.QueueHandler):
+    """Drops lines when too many wait."""
+
+    def enqueue(self, record: logging.LogRecord) -> None:
+        with contextlib.suppress(queue.Full):
+            self.queue.put_nowait(record)

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import contextlib
-import logging
 from collections.abc import Callable, Sequence
-from types import TracebackType
 
 from steerclear.shield.bridge.clock import Clock
 from steerclear.shield.bridge.feed import FeedReceiver, FeedSender, GameState
 from steerclear.shield.bridge.fleet_file import FleetFile
+from steerclear.shield.bridge.links import LINK_MAKERS, key_of
 from steerclear.shield.bridge.messages import Contact, Link, LinkMaker, contact_of
-from steerclear.shield.bridge.session import LINK_MAKERS, key_of
 from steerclear.shield.compat import Self
 from steerclear.shield.exceptions import FleetFileError
 
 from .rules import Umpire, game_config, player_names
 
 CONNECT_S = 15.0
+RATE_HZ = 10.0
+LINGER_S = 3.0
+"""How long the end of a game is told, s."""
+Told = Callable[[GameState, Sequence[str]], None]
+"""Called each time with the state of the game and what happened, a line each."""
 
 
 class Hearing:
@@ -45,17 +48,14 @@ class Hearing:
         self._error_m = fleet.shield_config.position_error_m
         self._clock, self._max_age_s = clock, fleet.limits.contact.max_age_s
         self._links: list[Link] = []
-        self._open = contextlib.ExitStack()
-        try:
+        with contextlib.ExitStack() as stack:
             if address is not None:
                 allow = ("127.0.0.1",) if fleet.feed is None else fleet.feed.allow
                 feed = FeedReceiver(address, fleet.frame, clock, allow, fleet.names, key_of(fleet))
-                self.feed = self._open.enter_context(feed)
+                self.feed = stack.enter_context(feed)
             if links:
-                self._connect(fleet, clock)
-        except BaseException:
-            self.close()
-            raise
+                self._connect(fleet, clock, stack)
+            self._open = stack.pop_all()
 
     def contacts(self) -> Sequence[Contact]:
         """The latest contact of each boat heard of: of its own link, else of who was heard first and still speaks."""
@@ -71,52 +71,34 @@ class Hearing:
 
     def close(self) -> None:
         """Give everything back, telling no boat anything; may be called again."""
-        for link in self._links:
-            link.release()
-        self._links = []
         self._open.close()
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _connect(self, fleet: FleetFile, clock: Clock) -> None:
+    def _connect(self, fleet: FleetFile, clock: Clock, stack: contextlib.ExitStack) -> None:
         makers: dict[str, LinkMaker] = {}
         for boat in fleet.boats:
             if boat.link is not None:
-                kind = boat.link.kind
-                maker = makers[kind] = makers.get(kind) or LINK_MAKERS[kind](fleet, clock, None)
-                self._links.append(maker.link(boat))
+                if boat.link.kind not in makers:
+                    makers[boat.link.kind] = LINK_MAKERS[boat.link.kind](fleet, clock, None)
+                    stack.callback(makers[boat.link.kind].close)
+                self._links.append(makers[boat.link.kind].link(boat))
+        for link in self._links:
+            stack.callback(link.release)
         for maker in makers.values():
-            self._open.callback(maker.close)
             maker.open()
         for link in self._links:
             link.connect(CONNECT_S)
 
 
-logger = logging.getLogger(__name__)
-
-RATE_HZ = 10.0
-LINGER_S = 3.0
-"""How long the end of a game is told, s."""
-
-Told = Callable[[GameState, Sequence[str]], None]
-"""Called each time with the state of the game and what happened, a line each."""
-
-
 class Referee:
     """Hears positions, applies the rules, publishes the state of the game. A context manager.
 
-    Args:
-        fleet: the file.
-        clock: of all times.
-        listen: HOST:PORT to hear positions at; None: the file's feed.referee.
-        publish: HOST:PORT of further listeners, besides the file's runners.
-        links: whether boats that have a link are heard there too.
+    As `Hearing`; ``publish`` are HOST:PORT of further listeners, besides the file's runners.
 
     Raises:
         FleetFileError: the file has no game, or does not say where to hear positions or whom to tell.
@@ -137,12 +119,11 @@ class Referee:
         if not to:
             raise FleetFileError('nobody is told how the game stands; add feed.listen: "HOST:PORT", or give --publish')
         self.clock = clock
-        self.hearing = Hearing(fleet, clock, listen, links)
-        try:
+        with contextlib.ExitStack() as stack:
+            self.hearing = stack.enter_context(Hearing(fleet, clock, listen, links))
             self._sender = FeedSender("referee", to, key_of(fleet))
-        except BaseException:
-            self.hearing.close()
-            raise
+            stack.callback(self._sender.close)
+            self._open = stack.pop_all()
 
     def turn(self) -> GameState:
         """Look once and tell everybody."""
@@ -153,13 +134,7 @@ class Referee:
     def run(
         self, told: Told, stopped: Callable[[], bool], rate_hz: float = RATE_HZ, limit_s: float | None = None
     ) -> str:
-        """Keep the game until it is over, stopped, or the time is up.
-
-        Args:
-            told: called after each look.
-            stopped: asked before each look.
-            rate_hz: looks a second.
-            limit_s: longest time from now, s; None: no limit.
+        """Keep the game until it is over, stopped (asked before each look), or the time from now is up.
 
         Returns:
             Why it ended: "over", "stopped" or "time".
@@ -182,13 +157,10 @@ class Referee:
 
     def close(self) -> None:
         """Give the sockets back; may be called again."""
-        self.hearing.close()
-        self._sender.close()
+        self._open.close()
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import time
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
+from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.table import Table
+from rich.text import Text
 from steerclear.env.record import Record
 from steerclear.shield.bridge.blackbox import ChainCheck, LogHeader, LogLine, LogReader
 from steerclear.shield.bridge.blackbox.header import describe_machine, source_digest, table_digests, versions
@@ -21,6 +23,8 @@ from .tracks import TrackBuilder, Tracks, Without, placed, record_of, sail_witho
 
 MOST_LINES = 200
 """Lines of the log kept for the report."""
+MOST_ROWS = 12
+"""Rows of a table; the rest is counted."""
 
 
 @dataclass
@@ -41,8 +45,7 @@ class Replay:
         origin: what differs between the machine and versions of the log and of this program.
         tracks, without: what happened and what would have happened; None where not asked for.
         records: of both.
-        sides: closest distances, m, and breaches, by "with" and "without".
-        breaches: with verdicts, by "with" and "without".
+        sides: by "with" and "without": closest distances, m, numbers of breaches and the breaches with verdicts.
     """
 
     header: LogHeader
@@ -60,7 +63,6 @@ class Replay:
     without: Without | None = None
     records: list[Record] = field(default_factory=list)
     sides: dict[str, dict[str, Any]] = field(default_factory=dict)
-    breaches: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
 
     @property
     def proved(self) -> bool:
@@ -71,19 +73,6 @@ class Replay:
     def made_by(self) -> str:
         """Which version wrote the log."""
         return f"steerclear {self.header.versions.get('steerclear', 'unknown')}, sources {self.header.sources[:8]}"
-
-    @property
-    def is_by_another(self) -> bool:
-        """Whether the log's program may decide otherwise than this one."""
-        return bool(self.origin)
-
-
-@dataclass(frozen=True)
-class _Judged:
-    """What the oracle looks back at."""
-
-    states: Any
-    driven: Any
 
 
 def replay_log(log: LogReader, keep_tracks: bool) -> Replay:
@@ -105,8 +94,7 @@ def replay_log(log: LogReader, keep_tracks: bool) -> Replay:
         prover.add(entry)
         last_s = entry.began_s
         actions.update((action.condition, action.response, action.subject) for action in entry.actions)
-        if entry.decisions is not None:
-            reasons.update(d.reason.name for d in entry.decisions if d.reason.name != "NOT_COVERED")
+        reasons.update(d.reason.name for d in entry.decisions or () if d.reason.name != "NOT_COVERED")
         if keep_tracks:
             builder.add(entry)
     return Replay(
@@ -127,10 +115,11 @@ def replay_log(log: LogReader, keep_tracks: bool) -> Replay:
 
 def origin_of(header: LogHeader) -> list[str]:
     """What may change a last bit between the log's program and this one, in words."""
+    here = versions()
     found = [
-        f"{name} {header.versions.get(name, 'none')} there, {versions().get(name, 'none')} here"
-        for name in sorted({*header.versions, *versions()})
-        if header.versions.get(name) != versions().get(name)
+        f"{name} {header.versions.get(name, 'none')} there, {here.get(name, 'none')} here"
+        for name in sorted({*header.versions, *here})
+        if header.versions.get(name) != here.get(name)
     ]
     if header.sources != source_digest():
         found.append("the sources of the shield are others")
@@ -144,7 +133,7 @@ def origin_of(header: LogHeader) -> list[str]:
 def draw(replay: Replay) -> None:
     """Fill in the record of what happened, distances and breaches."""
     if replay.tracks is not None:
-        _add_side(replay, "with", "as it was", replay.tracks.states)
+        _add_side(replay, replay.tracks, "with", "as it was", replay.tracks.states)
 
 
 def compare(replay: Replay, judge: bool) -> None:
@@ -153,163 +142,121 @@ def compare(replay: Replay, judge: bool) -> None:
     if tracks is None:
         return
     replay.without = sail_without(tracks, replay.header.config.delay_s)
-    _add_side(replay, "without", "without the shield", replay.without.states)
+    _add_side(replay, tracks, "without", "without the shield", replay.without.states)
     if judge:
         side = min(int(tracks.team[tracks.ours].min(initial=1)), 1)
-        seen = _Judged(placed(tracks.states), tracks.driven)
-        replay.breaches["with"] = judge_game(seen, tracks.params, replay.records[0], side)  # type: ignore[arg-type]
+        seen: Any = SimpleNamespace(states=placed(tracks.states), driven=tracks.marked("driven"))
+        replay.sides["with"]["breaches"] = judge_game(seen, tracks.params, replay.records[0], side)
 
 
-def _add_side(replay: Replay, side: str, title: str, states: Any) -> None:
-    tracks = replay.tracks
-    if tracks is None:
-        return
+def _add_side(replay: Replay, tracks: Tracks, side: str, title: str, states: Any) -> None:
+    """Closest distances, m, None without such a pair, and breaches of own boats nobody judged yet, see `keys`."""
     record = record_of(replay.header, tracks, states, title, shielded=side == "with")
     replay.records.append(record)
-    replay.sides[side] = _distances(record, tracks, states)
-    ours = [row for row in record["breaches"] if tracks.ours[[int(row[1]), int(row[2])]].any()]
-    replay.breaches[side] = [_entry(row, tracks, replay.header.config.separation_m) for row in ours]
-
-
-def _entry(row: Any, tracks: Tracks, radius_m: float) -> dict[str, Any]:
-    """A breach nobody judged, with the keys of `docs_keys.BREACH`."""
-    step, pair = int(row[0]), (int(row[1]), int(row[2]))
-    both = bool(tracks.ours[list(pair)].all())
-    return {
-        "step": step,
-        "time_s": step * tracks.dt_s,
-        "boats": [tracks.names[boat] for boat in pair],
-        "kind": "teammate" if both else "opponent",
-        "radius_m": radius_m,
-        "closest_m": float(row[3]),
-        "verdict": NOT_JUDGED,
-        "last_preventable_s": None,
-        "other_last_preventable_s": None,
-        "exhausted": None,
-        "responsible": None,
-        "responsible_boats": [],
-    }
-
-
-def _distances(record: Record, tracks: Tracks, states: Any) -> dict[str, Any]:
-    """Closest distances, m, and numbers of breaches of own boats, by kind of pair; None without such a pair."""
-    position, ours = placed(states)[:, :, :2], tracks.ours
-    distances = PairDistances.of(position)
-    found: dict[str, Any] = {}
+    distances = PairDistances.of(placed(states)[:, :, :2])
+    found: dict[str, Any] = {"breaches": []}
+    for row in record["breaches"]:
+        pair = [int(row[1]), int(row[2])]
+        if tracks.ours[pair].any():
+            found["breaches"].append(
+                {
+                    "step": int(row[0]),
+                    "time_s": int(row[0]) * tracks.dt_s,
+                    "boats": [tracks.names[boat] for boat in pair],
+                    "kind": "teammate" if tracks.ours[pair].all() else "opponent",
+                    "radius_m": replay.header.config.separation_m,
+                    "closest_m": float(row[3]),
+                    "verdict": NOT_JUDGED,
+                    **dict.fromkeys(("last_preventable_s", "other_last_preventable_s", "exhausted", "responsible")),
+                    "responsible_boats": [],
+                }
+            )
     for kind, wanted in (("teammate", 2), ("opponent", 1)):
-        columns = [c for c, pair in enumerate(distances.pairs) if ours[list(pair)].sum() == wanted]
+        columns = [c for c, pair in enumerate(distances.pairs) if tracks.ours[list(pair)].sum() == wanted]
         gaps = distances.distance_m[:, columns]
         near = gaps[gaps < 1e5]
         found[f"closest_{kind}_m"] = float(near.min()) if near.size else None
-        both = [ours[[int(row[1]), int(row[2])]].sum() == wanted for row in record["breaches"]]
-        found[f"breaches_{kind}"] = int(np.sum(both))
-    return found
+        found[f"breaches_{kind}"] = sum(breach["kind"] == kind for breach in found["breaches"])
+    replay.sides[side] = found
 
 
 def as_content(replay: Replay) -> dict[str, Any]:
     """The report as JSON-ready content, see `keys.REPLAY`."""
-    proof = replay.proof
+    proof, chain = replay.proof, replay.chain
+    counts = asdict(proof)
+    del counts["covered"]
     content: dict[str, Any] = {
-        "began": replay.began,
-        "seconds": replay.seconds,
+        **{name: getattr(replay, name) for name in ("began", "seconds", "complete", "made_by", "proved", "damage")},
         "policy": replay.header.policy,
-        "complete": replay.complete,
-        "made_by": replay.made_by,
-        "proved": replay.proved,
-        "chain": {
-            "chained": replay.chain.chained,
-            "keyed": replay.chain.keyed,
-            "codes_checked": replay.chain.codes_checked,
-            "mended": replay.chain.is_mended,
-            "broken": replay.chain.broken,
-            "breaks": replay.chain.breaks,
-        },
-        "damage": replay.damage,
         "origin": replay.origin,
-        "ticks": proof.ticks,
-        "decisions": proof.decisions,
-        "same": proof.same,
-        "different": proof.different,
-        "unproven": proof.unproven,
-        "missing": [list(stretch) for stretch in proof.missing],
-        "first_difference": None if proof.first is None else asdict(proof.first),
-        "strayed": proof.strayed,
-        "unfounded": proof.unfounded,
+        "chain": {
+            **{name: getattr(chain, name) for name in ("chained", "keyed", "codes_checked", "broken", "breaks")},
+            "mended": chain.is_mended,
+        },
+        **counts,
+        "missing": [list(stretch) for stretch in counts["missing"]],
         "cut": [{"boat": boat, "limit_mps": limit, "commands": count} for (boat, limit), count in proof.cut.items()],
-        "first_sent": None if proof.first_sent is None else asdict(proof.first_sent),
         "reasons": dict(replay.reasons),
         "actions": [
             {"condition": condition, "response": response, "subject": subject, "ticks": count}
             for (condition, response, subject), count in replay.actions.most_common()
         ],
+        "sides": replay.sides,
     }
-    if replay.without is not None:
-        content["stretches"] = replay.without.stretches
-    content["sides"] = {side: {**found, "breaches": replay.breaches[side]} for side, found in replay.sides.items()}
-    return content
-
-
-MOST_ROWS = 12
-"""Rows of a table; the rest is counted."""
+    del content["first"]
+    content["first_difference"] = proof.first and proof.first._asdict()
+    content["first_sent"] = proof.first_sent and proof.first_sent._asdict()
+    return content if replay.without is None else {**content, "stretches": replay.without.stretches}
 
 
 def show(console: Console, replay: Replay) -> None:
     """Print the whole report."""
-    _show_log(console, replay)
-    _show_chain(console, replay)
-    _show_proof(console, replay)
-    _show_actions(console, replay)
-    if replay.without is not None:
-        _show_sides(console, replay)
-        for side, title in (("with", "Breaches that happened"), ("without", "Breaches without the shield")):
-            _show_breaches(console, title, replay.breaches[side])
+    for part in (*_log_lines(replay), *_chain_lines(replay.chain), *_proof_lines(replay), *_tables(replay)):
+        console.print(part)
 
 
-def _show_log(console: Console, replay: Replay) -> None:
-    header, proof = replay.header, replay.proof
+def _rest(count: int) -> list[str]:
+    return [f"  and {count - MOST_ROWS} more"] if count > MOST_ROWS else []
+
+
+def _log_lines(replay: Replay) -> Iterator[RenderableType]:
+    header = replay.header
     ours = [boat.name for boat in header.boats if boat.ours]
-    console.print(
-        f"{replay.began}, {replay.seconds:.1f} s, {proof.ticks} ticks"
-        + (f", policy {header.policy}" if header.policy else "")
-        + (f", own boats {', '.join(ours)}" if ours else "")
-    )
-    if replay.is_by_another:
-        text = f"Made by {replay.made_by}. Not all is as here, and this program may decide otherwise:"
-        console.print(text, style="yellow", markup=False)
-        for text in replay.origin:
-            console.print(f"  {text}", markup=False)
+    whose = f", policy {header.policy}" * bool(header.policy) + f", own boats {', '.join(ours)}" * bool(ours)
+    yield Text(f"{replay.began}, {replay.seconds:.1f} s, {replay.proof.ticks} ticks{whose}")
+    if replay.origin:
+        yield Text(
+            f"Made by {replay.made_by}. Not all is as here, and this program may decide otherwise:", style="yellow"
+        )
+        yield from (Text(f"  {text}") for text in replay.origin)
     if replay.chain.is_mended:
-        console.print("The log was cut off (crash, power or kill) and mended; what followed is missing.")
+        yield "The log was cut off (crash, power or kill) and mended; what followed is missing."
     elif not replay.complete:
-        console.print("The log was not closed (crash, power or kill); read up to what was on the disk.")
-    for text in replay.damage:
-        console.print(f"Damage: {text}.", style="red", markup=False)
-    for line in replay.lines[:MOST_ROWS]:
-        console.print(f"  {line.name}: {line.text}", markup=False)
-    _rest(console, len(replay.lines))
+        yield "The log was not closed (crash, power or kill); read up to what was on the disk."
+    yield from (Text(f"Damage: {text}.", style="red") for text in replay.damage)
+    yield from (Text(f"  {line.name}: {line.text}") for line in replay.lines[:MOST_ROWS])
+    yield from _rest(len(replay.lines))
 
 
-def _show_chain(console: Console, replay: Replay) -> None:
-    chain = replay.chain
+def _chain_lines(chain: ChainCheck) -> Iterator[RenderableType]:
     if chain.broken:
-        console.print("The log is not as it was written:", style="red")
-        for text in chain.breaks[:MOST_ROWS]:
-            console.print(f"  {text}", markup=False)
-        _rest(console, chain.broken)
-    elif chain.keyed and not chain.codes_checked:
-        console.print("Its chain holds. Its codes were not checked: give --key FILE, the key of the boats.")
+        yield Text("The log is not as it was written:", style="red")
+        yield from (Text(f"  {text}") for text in chain.breaks[:MOST_ROWS])
+        yield from _rest(chain.broken)
     elif chain.codes_checked:
-        console.print(f"Its chain holds, and {chain.codes_checked} codes are of this key.")
+        yield f"Its chain holds, and {chain.codes_checked} codes are of this key."
+    elif chain.keyed:
+        yield "Its chain holds. Its codes were not checked: give --key FILE, the key of the boats."
 
 
-def _show_proof(console: Console, replay: Replay) -> None:
+def _proof_lines(replay: Replay) -> Iterator[RenderableType]:
     proof = replay.proof
     if proof.decisions == 0:
-        console.print("The log holds no decision of the shield: nothing is proved.", style="yellow")
+        yield Text("The log holds no decision of the shield: nothing is proved.", style="yellow")
     elif proof.different == 0 and proof.unproven == 0:
-        console.print(f"{proof.same} of {proof.decisions} decisions made again, the same bit for bit.", style="green")
+        yield Text(f"{proof.same} of {proof.decisions} decisions made again, the same bit for bit.", style="green")
     else:
-        console.print(
+        yield Text(
             f"{proof.same} of {proof.decisions} decisions are the same, {proof.different} differ, {proof.unproven} "
             f"differ after missing ticks and are not proved ({len(proof.missing)} gaps).",
             style="red" if proof.different else "yellow",
@@ -318,81 +265,64 @@ def _show_proof(console: Console, replay: Replay) -> None:
         lost = sum(after - before - 1 for before, after in proof.missing if after > before)
         back = sum(after <= before for before, after in proof.missing)
         text = f"{lost} turns are missing" + (f", {back} times they go back" if back else "")
-        console.print(f"{text}: what was decided then is not proved.", style="yellow")
+        yield Text(f"{text}: what was decided then is not proved.", style="yellow")
     if proof.first is not None:
-        _show_first(console, "First difference", proof.first, "recorded", "now")
+        yield _first("First difference", proof.first, "recorded", "now")
     if proof.strayed or proof.unfounded:
         text = f"{proof.strayed} commands are not what was decided, {proof.unfounded} were sent without a decision."
-        console.print(text, style="red" if proof.strayed else "yellow")
+        yield Text(text, style="red" if proof.strayed else "yellow")
     for (boat, limit_mps), count in proof.cut.items():
-        console.print(f"{boat}: its autopilot's limit of {limit_mps:g} m/s cut {count} commands.", markup=False)
+        yield Text(f"{boat}: its autopilot's limit of {limit_mps:g} m/s cut {count} commands.")
     if proof.first_sent is not None:
-        _show_first(console, "First of them", proof.first_sent, "decided", "sent")
-    if replay.proof.holds and not replay.proved:
-        console.print("NOT PROVED.", style="yellow")
+        yield _first("First of them", proof.first_sent, "decided", "sent")
+    if proof.holds and not replay.proved:
+        yield Text("NOT PROVED.", style="yellow")
     total = sum(replay.reasons.values())
     shares = ", ".join(f"{name} {count / total:.1%}" for name, count in replay.reasons.most_common())
-    console.print(f"Reasons: {shares}" if total else "No boat was covered: nothing is proved.")
+    yield Text(f"Reasons: {shares}" if total else "No boat was covered: nothing is proved.")
 
 
-def _show_first(console: Console, title: str, first: Difference, one: str, other: str) -> None:
-    console.print(
-        f"{title}: tick {first.tick} at {first.time_s:.2f} s, {first.boat or 'all boats'}, {first.what}: "
-        f"{one} {first.recorded}, {other} {first.replayed}",
-        markup=False,
-    )
+def _first(title: str, first: Difference, one: str, other: str) -> Text:
+    where = f"tick {first.tick} at {first.time_s:.2f} s, {first.boat or 'all boats'}, {first.what}"
+    return Text(f"{title}: {where}: {one} {first.recorded}, {other} {first.replayed}")
 
 
-def _show_actions(console: Console, replay: Replay) -> None:
-    if not replay.actions:
+def _tables(replay: Replay) -> Iterator[RenderableType]:
+    if replay.actions:
+        table = Table("condition", "response", "subject", "ticks", title="Declared and in effect", title_justify="left")
+        for (condition, response, subject), count in replay.actions.most_common(MOST_ROWS):
+            table.add_row(condition, response, subject, str(count))
+        yield table
+        yield from _rest(len(replay.actions))
+    if replay.without is None:
         return
-    table = Table("condition", "response", "subject", "ticks", title="Declared and in effect", title_justify="left")
-    for (condition, response, subject), count in replay.actions.most_common(MOST_ROWS):
-        table.add_row(condition, response, subject, str(count))
-    console.print(table)
-    _rest(console, len(replay.actions))
-
-
-def _show_sides(console: Console, replay: Replay) -> None:
     table = Table("", "with the shield", "without", title="Own boats", title_justify="left")
-    sides = [replay.sides[side] for side in ("with", "without")]
     for key, name in (
         ("closest_teammate_m", "closest teammate, m"),
         ("closest_opponent_m", "closest other boat, m"),
         ("breaches_teammate", "breaches with teammates"),
         ("breaches_opponent", "breaches with others"),
     ):
-        table.add_row(name, *(_number(side[key]) for side in sides))
-    console.print(table)
-    stretches = 0 if replay.without is None else replay.without.stretches
-    console.print(
-        f"Radius {replay.header.config.separation_m:g} m. Boats left their track {stretches} times to do what was "
-        "wanted; others stay on theirs."
-    )
+        table.add_row(name, *(_number(replay.sides[side][key]) for side in ("with", "without")))
+    yield table
+    left = f"Boats left their track {replay.without.stretches} times to do what was wanted; others stay on theirs."
+    yield f"Radius {replay.header.config.separation_m:g} m. {left}"
+    for side, title in (("with", "Breaches that happened"), ("without", "Breaches without the shield")):
+        if breaches := replay.sides[side]["breaches"]:
+            yield _breaches(title, breaches)
+            yield from _rest(len(breaches))
 
 
-def _show_breaches(console: Console, title: str, breaches: list[dict[str, Any]]) -> None:
-    if not breaches:
-        return
+def _breaches(title: str, breaches: list[dict[str, Any]]) -> Table:
     judged = any(entry["responsible"] for entry in breaches)
-    table = Table("time, s", "boats", "closest, m", title=title, title_justify="left")
-    for name in ("verdict", "last chance, s before", "responsible") if judged else ():
-        table.add_column(name)
+    more = ("verdict", "last chance, s before", "responsible") if judged else ()
+    table = Table("time, s", "boats", "closest, m", *more, title=title, title_justify="left")
     for entry in breaches[:MOST_ROWS]:
         row = [f"{entry['time_s']:.1f}", ", ".join(entry["boats"]), f"{entry['closest_m']:.2f}"]
-        if judged:
-            row += [entry["verdict"], _number(entry["last_preventable_s"]), entry["responsible"] or "-"]
-        table.add_row(*row)
-    console.print(table)
-    _rest(console, len(breaches))
+        verdict = [entry["verdict"], _number(entry["last_preventable_s"]), entry["responsible"] or "-"]
+        table.add_row(*row, *(verdict if judged else ()))
+    return table
 
 
 def _number(value: Any) -> str:
-    if value is None:
-        return "-"
-    return f"{value:.2f}" if isinstance(value, float) else str(value)
-
-
-def _rest(console: Console, count: int) -> None:
-    if count > MOST_ROWS:
-        console.print(f"  and {count - MOST_ROWS} more")
+    return "-" if value is None else f"{value:.2f}" if isinstance(value, float) else str(value)

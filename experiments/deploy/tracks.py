@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 from steerclear.env.config import GameConfig
 from steerclear.env.record import NOT_COVERED, Record, find_breaches, make_record
@@ -23,9 +24,19 @@ from steerclear.shield.tracks import fill_memory, whole_steps
 Array = NDArray[np.float64]
 GONE_S = 1.5
 """A boat that nothing was heard of for longer than this is not there, s."""
-_MATCH_S = 1e-6
+BACK_S, LONGEST_S = 5.0, 20.0
+"""A boat is put back when its command was not changed for so long, and after so long in any case, s."""
+OFF_M = 1e6
+"""Where boats are that are not there, m, each as far from the next."""
 MOST_STEPS = 10_000_000
 """Ten days at 10 Hz: more is damage."""
+_MATCH_S = 1e-6
+_SEEN = L.SPEED + 1
+_DECIDED = np.dtype(
+    [("wanted", "f8", 2), ("sent", "f8", 2), ("reason", "i8"), ("intervened", "?"), ("safety_margin_m", "f8")]
+)
+"""One boat's part of one tick."""
+_NOTHING = ((math.nan, math.nan), (math.nan, math.nan), int(Reason.NOT_COVERED), False, math.nan)
 
 
 @dataclass(frozen=True)
@@ -44,7 +55,6 @@ class Tracks:
         reason: (T, n); NOT_COVERED where nothing was decided.
         intervened: (T, n) bool.
         safety_margin_m: (T, n); NaN where nothing was decided.
-        driven: (T, n) bool, the game steered the boat.
         games: (T,) state of the game at each step.
         dt_s: step, s.
     """
@@ -61,29 +71,22 @@ class Tracks:
     reason: NDArray[np.int64]
     intervened: NDArray[np.bool_]
     safety_margin_m: Array
-    driven: NDArray[np.bool_]
-    games: list[Mapping[str, Any]]
+    games: Sequence[Mapping[str, Any]]
     dt_s: float
 
-    @property
-    def positions(self) -> Array:
-        """(T+1, n, 2) m; NaN where a boat was not there."""
-        return self.states[:, :, : L.Y + 1]
+    def marked(self, key: str) -> NDArray[np.bool_]:
+        """(T, n) whether the referee's state of the game said that of a boat, such as "driven"."""
+        return np.array([[_status(game, name, key) for name in self.names] for game in self.games])
 
 
-_DECIDED = np.dtype(
-    [("wanted", "f8", 2), ("sent", "f8", 2), ("reason", "i8"), ("intervened", "?"), ("safety_margin_m", "f8")]
-)
-"""One boat's part of one tick."""
-_NOTHING = ((math.nan, math.nan), (math.nan, math.nan), int(Reason.NOT_COVERED), False, math.nan)
+def _status(game: Mapping[str, Any], name: str, key: str) -> bool:
+    boats = game.get("boats")
+    boat = boats.get(name) if isinstance(boats, Mapping) else None
+    return isinstance(boat, Mapping) and bool(boat.get(key))
 
 
 class TrackBuilder:
-    """Collects ticks.
-
-    Args:
-        header: of the log.
-    """
+    """Collects ticks of a log."""
 
     def __init__(self, header: LogHeader) -> None:
         self._header = header
@@ -98,22 +101,21 @@ class TrackBuilder:
 
     def add(self, tick: Tick) -> None:
         """Add one tick."""
-        time_s = tick.began_s - self._header.clock_s
+        time_s, fleet = tick.began_s - self._header.clock_s, tick.fleet
         self._times.append(time_s)
         self._games.append(tick.game)
         self._decided.append(self._decisions(tick))
-        fleet = tick.fleet
         if fleet is None:
             return
         for i, name in enumerate(fleet.names):
             if GHOST in name:
                 continue  # a place the boat was kept from, not a boat
-            age_s = 0.0 if fleet.age_s is None else float(fleet.age_s[i])
+            fixed_s = time_s - (0.0 if fleet.age_s is None else float(fleet.age_s[i]))
             fixes = self._fixes.setdefault(name, [])
             self._team.setdefault(name, int(fleet.team[i]))
             self._kind[name] = fleet.platforms[i]
-            if not fixes or time_s - age_s > fixes[-1][0] + _MATCH_S:
-                fixes.append((time_s - age_s, fleet.state[i].copy()))
+            if not fixes or fixed_s > fixes[-1][0] + _MATCH_S:
+                fixes.append((fixed_s, fleet.state[i].copy()))
 
     def finish(self) -> Tracks:
         """The tracks.
@@ -128,35 +130,39 @@ class TrackBuilder:
         span = (self._times[-1] - self._times[0]) / dt_s + 0.5
         if not 1.0 <= span < MOST_STEPS:
             raise LogError(f"the times of the log's ticks span {span:g} steps; there is nothing to replay")
-        steps = int(span)
-        time_s = self._times[0] + dt_s * np.arange(steps + 1)
-        kinds = [self._header.platforms.get(self._kind[name], self._kind[name]) for name in names]
-        params = np.array([get_platform(kind).pack() for kind in kinds])
+        time_s: Array = self._times[0] + dt_s * np.arange(int(span) + 1, dtype=np.float64)
+        kinds: list[Any] = [self._kind[name] for name in names]
+        platforms = [get_platform(self._header.platforms.get(kind, kind)) for kind in kinds]
+        params = np.array([platform.pack() for platform in platforms])
         states = np.stack([_states(self._fixes[name], time_s) for name in names], axis=1)
-        _fill(states, params)
+        for i in range(len(names)):  # memory nobody told: thrust that holds the speed, no rudder
+            there = np.isfinite(states[:, i, L.X])
+            rows = np.ascontiguousarray(states[there, i])
+            fill_memory(rows, np.repeat(params[i : i + 1], len(rows), axis=0))
+            states[there, i] = rows
         at = np.searchsorted(np.array(self._times) - _MATCH_S, time_s[:-1], side="right") - 1
         decided = np.array([[self._decided[k].get(name, _NOTHING) for name in names] for k in at], dtype=_DECIDED)
         return Tracks(
             names=names,
             team=np.array([self._team[name] for name in names], dtype=np.int64),
             ours=np.array([name in self._ours for name in names]),
-            platforms=tuple(get_platform(kind).name for kind in kinds),
+            platforms=tuple(platform.name for platform in platforms),
             params=params,
             time_s=time_s,
             states=states,
-            driven=np.array([[_driven(self._games[k], name) for name in names] for k in at]),
             games=[self._games[k] for k in at],
             dt_s=dt_s,
             **{column: decided[column] for column in decided.dtype.names or ()},
         )
 
     def _decisions(self, tick: Tick) -> dict[str, Any]:
-        decisions = tick.decisions
-        if decisions is None:
-            return {}
-        found = {}
-        for i, name in enumerate(decisions.fleet.names):
-            if not decisions.fleet.controlled[i] or (self._header.boats and name not in self._mine):
+        found, decisions = {}, tick.decisions
+        for i, name in enumerate(() if decisions is None else decisions.fleet.names):
+            if (
+                decisions is None
+                or not decisions.fleet.controlled[i]
+                or (self._header.boats and name not in self._mine)
+            ):
                 continue  # teammates with a shield of their own are steered by another process
             own_rad = float(decisions.fleet.heading_rad[i])
             self._ours.add(name)
@@ -170,53 +176,28 @@ class TrackBuilder:
         return found
 
 
-def _driven(game: Mapping[str, Any], name: str) -> bool:
-    boats = game.get("boats")
-    boat = boats.get(name) if isinstance(boats, Mapping) else None
-    return isinstance(boat, Mapping) and bool(boat.get("driven"))
-
-
 def _states(fixes: list[tuple[float, Array]], time_s: Array) -> Array:
     """One boat's rows (T+1, N_STATE) from its fixes: places, headings and speeds between them, memory as it was."""
-    known_s = np.array([fix[0] for fix in fixes])
-    rows = np.array([fix[1] for fix in fixes])
+    known_s, rows = np.array([fix[0] for fix in fixes]), np.array([fix[1] for fix in fixes])
     before = np.clip(np.searchsorted(known_s - _MATCH_S, time_s, side="right") - 1, 0, len(rows) - 1)
     states = rows[before].copy()
-    turned_deg = np.degrees(np.unwrap(np.radians(rows[:, L.HEADING])))
-    for column, values in ((L.X, rows[:, L.X]), (L.Y, rows[:, L.Y]), (L.SPEED, rows[:, L.SPEED])):
-        states[:, column] = np.interp(time_s, known_s, values)
-    heading_deg = np.interp(time_s, known_s, turned_deg)
-    states[:, L.HEADING] = (heading_deg + 180.0) % 360.0 - 180.0
+    for column in (L.X, L.Y, L.SPEED, L.HEADING):
+        values = rows[:, column]
+        turned = np.degrees(np.unwrap(np.radians(values))) if column == L.HEADING else values
+        states[:, column] = np.interp(time_s, known_s, turned)
+    states[:, L.HEADING] = _wrapped(states[:, L.HEADING])
     after = np.minimum(before + 1, len(rows) - 1)
     away_s = np.minimum(np.abs(time_s - known_s[before]), np.abs(known_s[after] - time_s))
     states[away_s > GONE_S] = np.nan
     return states
 
 
-def _fill(states: Array, params: Array) -> None:
-    """Memory nobody told: thrust that holds the speed, no rudder; in place, boats that are not there left out."""
-    for i in range(states.shape[1]):
-        there = np.isfinite(states[:, i, L.X])
-        rows = np.ascontiguousarray(states[there, i])
-        fill_memory(rows, np.repeat(params[i : i + 1], len(rows), axis=0))
-        states[there, i] = rows
+def _wrapped(degrees: Any) -> Any:
+    return (degrees + 180.0) % 360.0 - 180.0
 
 
-BACK_S = 5.0
-"""A boat is put back when its command was not changed for so long, s."""
-LONGEST_S = 20.0
-"""A boat is put back after so long in any case, s."""
-
-
-@dataclass(frozen=True)
-class Without:
-    """Tracks without the shield.
-
-    Attributes:
-        states: (T+1, n, N_STATE) as in `Tracks`.
-        away: (T+1, n) bool, boats that are not on their recorded track.
-        stretches: how many times a boat left it.
-    """
+class Without(NamedTuple):
+    """Tracks without the shield: states (T+1, n, N_STATE), boats off their track (T+1, n), times they left it."""
 
     states: Array
     away: NDArray[np.bool_]
@@ -224,12 +205,7 @@ class Without:
 
 
 def sail_without(tracks: Tracks, delay_s: float = 0.0) -> Without:
-    """Steer boats whose command was changed by what was wanted.
-
-    Args:
-        tracks: what happened.
-        delay_s: from a command to its effect, s.
-    """
+    """Steer boats whose command was changed by what was wanted; ``delay_s``: from a command to its effect, s."""
     states = tracks.states.copy()
     away = np.zeros(states.shape[:2], dtype=np.bool_)
     late = whole_steps(delay_s, tracks.dt_s)
@@ -240,8 +216,8 @@ def sail_without(tracks: Tracks, delay_s: float = 0.0) -> Without:
 def _sail(tracks: Tracks, i: int, late: int, states: Array, away: NDArray[np.bool_]) -> int:
     """One boat, in place; returns how many times it left its track."""
     back, longest = round(BACK_S / tracks.dt_s), round(LONGEST_S / tracks.dt_s)
-    begun = quiet = 0
-    out, stretches = False, 0
+    begun = quiet = stretches = 0
+    out = False
     for k in range(late, len(tracks.wanted)):
         changed = bool(tracks.intervened[k - late, i])
         quiet = 0 if changed else quiet + 1
@@ -252,73 +228,50 @@ def _sail(tracks: Tracks, i: int, late: int, states: Array, away: NDArray[np.boo
             out, begun, stretches = True, k, stretches + 1
             states[k, i] = tracks.states[k, i]
         if out:
-            states[k + 1, i] = _stepped(tracks, i, states[k, i], tracks.wanted[k - late, i])
+            states[k + 1, i] = states[k, i]
+            row = states[k + 1, i]
+            speed_mps, heading_rad = tracks.wanted[k - late, i].tolist()
+            if not (math.isfinite(speed_mps) and math.isfinite(heading_rad) and abs(speed_mps) < 1e3):
+                speed_mps, heading_rad = 0.0, math.radians(row[L.HEADING])  # nobody could follow it: stop on course
+            row = states[k + 1, i]
+            step_boat(
+                tracks.params[i], row, speed_mps, _wrapped(math.degrees(heading_rad) - row[L.HEADING]), tracks.dt_s
+            )
             away[k + 1, i] = True
     return stretches
 
 
-def _stepped(tracks: Tracks, i: int, row: Array, wanted: Array) -> Array:
-    """The boat one step on; a command nobody could follow leaves it to stop on its course."""
-    row = row.copy()
-    speed_mps, heading_rad = (float(value) for value in wanted)
-    if not (math.isfinite(speed_mps) and math.isfinite(heading_rad) and abs(speed_mps) < 1e3):
-        speed_mps, heading_rad = 0.0, math.radians(row[L.HEADING])
-    error_deg = (math.degrees(heading_rad) - row[L.HEADING] + 180.0) % 360.0 - 180.0
-    step_boat(tracks.params[i], row, speed_mps, error_deg, tracks.dt_s)
-    return row
-
-
-OFF_M = 1e6
-"""Where boats are that are not there, m, each as far from the next."""
-_MARKS = {"has_flag": "has_flag", "is_tagged": "tagged", "oob": "oob"}
-
-
 def placed(states: Array) -> Array:
     """States (T+1, n, N_STATE) with boats that are not there put far away from everything and one another."""
-    found = states.copy()
-    for i in range(states.shape[1]):
-        gone = ~np.isfinite(states[:, i, L.X])
-        found[gone, i] = 0.0
-        found[gone, i, L.X] = OFF_M * (i + 1)
-        found[gone, i, L.Y] = OFF_M
-    return found
-
-
-def drawn(states: Array) -> Array:
-    """States with boats that are not there left where they were last, or will be first."""
-    found = states.copy()
-    for i in range(states.shape[1]):
-        known = np.flatnonzero(np.isfinite(states[:, i, L.X]))
-        if len(known) == 0:
-            found[:, i] = 0.0
-            continue
-        last = known[np.clip(np.searchsorted(known, np.arange(len(states)), side="right") - 1, 0, None)]
-        found[:, i] = states[last, i]
+    found, gone = states.copy(), ~np.isfinite(states[:, :, L.X])
+    found[gone] = 0.0
+    found[..., L.X] += gone * OFF_M * (1 + np.arange(states.shape[1]))
+    found[..., L.Y] += gone * OFF_M
     return found
 
 
 def record_of(header: LogHeader, tracks: Tracks, states: Array, title: str, shielded: bool) -> Record:
-    """The record of a game.
+    """The record of a game with states (T+1, n, N_STATE), the tracks' own or those without the shield.
 
-    Args:
-        header: of the log.
-        tracks: what happened.
-        states: (T+1, n, N_STATE) the boats' states to record, the tracks' own or those without the shield.
-        title: of the record.
-        shielded: whether boats were sent what the shield said; otherwise what was wanted.
+    Boats that are not there stay where they were last, or will be first. Without ``shielded`` they were sent what was
+    wanted.
     """
-    seen = drawn(states)
-    marks = _marks(tracks)
+    flat = pd.DataFrame(states[..., :_SEEN].reshape(len(states), -1)).ffill().bfill().fillna(0.0)
+    seen = flat.to_numpy().reshape(*states.shape[:2], _SEEN)
     covered = shielded & (tracks.reason != NOT_COVERED)
-    wanted = _degrees(tracks.wanted)
+    wanted, sent = (_in_degrees(commands) for commands in (tracks.wanted, tracks.sent if shielded else tracks.wanted))
+    marks = {"has_flag": "has_flag", "is_tagged": "tagged", "oob": "oob"}
+    last = [*tracks.games, tracks.games[-1]]
     return make_record(
         _meta(header, tracks, title, shielded),
         position=seen[:, :, : L.Y + 1],
         heading_deg=seen[:, :, L.HEADING],
         speed_mps=seen[:, :, L.SPEED],
-        **marks,
+        **{array: tracks.marked(key)[[*range(len(tracks.games)), -1]] for array, key in marks.items()},
+        flag_position=np.array([_flags(game) for game in last], dtype=np.float64),
+        captures=np.array([_captures(game) for game in last], dtype=np.int64),
         wanted=wanted,
-        sent=_degrees(tracks.sent) if shielded else wanted,
+        sent=sent,
         reason=np.where(covered, tracks.reason, NOT_COVERED),
         intervened=tracks.intervened & covered,
         safety_margin_m=np.where(covered, tracks.safety_margin_m, np.nan),
@@ -326,30 +279,12 @@ def record_of(header: LogHeader, tracks: Tracks, states: Array, title: str, shie
     )
 
 
-def _degrees(commands: Array) -> Array:
-    found = commands.copy()
-    found[..., 1] = (np.degrees(found[..., 1]) + 180.0) % 360.0 - 180.0
-    return found
+def _in_degrees(commands: Array) -> Array:
+    return np.stack([commands[..., 0], _wrapped(np.degrees(commands[..., 1]))], axis=-1)
 
 
-def _marks(tracks: Tracks) -> dict[str, NDArray[Any]]:
-    """Flags, tags and scores as the game's state had them; nobody has anything where there was none."""
-    games = [*tracks.games, tracks.games[-1]]
-    marks: dict[str, NDArray[Any]] = {
-        array: np.array([[_mark(game, name, key) for name in tracks.names] for game in games])
-        for array, key in _MARKS.items()
-    }
-    marks["flag_position"] = np.array([_flags(game) for game in games], dtype=np.float64)
-    marks["captures"] = np.array([_pair(game.get("captures")) for game in games], dtype=np.int64)
-    return marks
-
-
-def _mark(game: Mapping[str, Any], name: str, key: str) -> bool:
-    boat = (game.get("boats") or {}).get(name)
-    return isinstance(boat, Mapping) and bool(boat.get(key))
-
-
-def _pair(values: Any) -> tuple[int, int]:
+def _captures(game: Mapping[str, Any]) -> tuple[int, int]:
+    values = game.get("captures")
     return (int(values[0]), int(values[1])) if isinstance(values, list | tuple) and len(values) == 2 else (0, 0)
 
 
@@ -361,10 +296,13 @@ def _flags(game: Mapping[str, Any]) -> list[tuple[float, float]]:
 
 
 def _meta(header: LogHeader, tracks: Tracks, title: str, shielded: bool) -> dict[str, Any]:
-    rules = _rules(header.preset)
+    try:
+        rules = GameConfig.preset(header.preset)  # radii to draw
+    except ConfigError:
+        rules = GameConfig.preset("aamas2024")  # the usual ones where the log names none that is known
     radii = rules.agent_radius_m
     flags = [_flags(game) for game in tracks.games if game.get("flags")]
-    size = header.field_size_m or tuple(float(value) for value in np.nanmax(np.abs(tracks.positions), axis=(0, 1)))
+    size = header.field_size_m or tuple(np.nanmax(np.abs(tracks.states[..., :2]), axis=(0, 1)).tolist())
     ours = "blue" if int(tracks.team[tracks.ours].min(initial=1)) == 0 else "red"
     return {
         "dt_s": tracks.dt_s,
@@ -385,11 +323,3 @@ def _meta(header: LogHeader, tracks: Tracks, title: str, shielded: bool) -> dict
         "platforms": list(tracks.platforms),
         "title": title,
     }
-
-
-def _rules(preset: str) -> GameConfig:
-    """Radii to draw: the preset's, or the usual ones where the log names none that is known."""
-    try:
-        return GameConfig.preset(preset)
-    except ConfigError:
-        return GameConfig.preset("aamas2024")

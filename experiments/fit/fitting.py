@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -22,19 +23,22 @@ WEIGHTS = np.array([1.0, 1.0, 0.02, 0.5])
 SOFT = 0.5
 """Residuals beyond this count less: one bad stretch must not bend the whole."""
 DELAYS_S = np.arange(0.025, 0.8, 0.05)
-BEGUN = 8
-"""Evaluations (each with its derivatives) that every first guess gets."""
+BEGUN, MOST, HELD = 8, 50, 12
+"""Evaluations (each with its derivatives) of every first guess, of the best of them, and of fits to held-out runs."""
+FOLDS = 3
+"""Runs of each kind are dealt out to so many parts; each part is predicted by a fit to the others."""
+AHEAD_S = (1.0, 3.0, 6.0)
+COVERED = 0.99
+JUDGED_EVERY = 3
+"""Steps between the moments from which a run is predicted."""
+DIGITS, CHOSEN_BY = 4, 0.9
+WORST_M = 3.0
+"""Held-out errors 3 s ahead beyond this say that the log is not of one boat obeying these commands."""
 
 
 @dataclass(frozen=True)
 class Fit:
-    """A fitted model.
-
-    Attributes:
-        model: which.
-        vector: its numbers.
-        cost: mean square of the weighted residuals.
-    """
+    """A fitted model, its numbers, and the mean square of the weighted residuals."""
 
     model: Model
     vector: Array
@@ -49,31 +53,22 @@ class Fit:
 def residuals(model: Model, vector: Array, runs: Sequence[Run], top_mps: float) -> Array:
     """Weighted differences of all runs, flat."""
     params = model.platform(vector, "fitted", top_mps).pack()
-    parts = [
-        (errors_of(params, run, float(vector[-1]), EVERY, AHEAD)[:, PICKED - 1 :: PICKED] * WEIGHTS).ravel()
-        for run in runs
-    ]
-    return np.nan_to_num(np.concatenate(parts), nan=1e3, posinf=1e3, neginf=-1e3)
+    errors = (errors_of(params, run, float(vector[-1]), EVERY, AHEAD)[:, PICKED - 1 :: PICKED] for run in runs)
+    flat = np.concatenate([(error * WEIGHTS).ravel() for error in errors])
+    return np.nan_to_num(flat, nan=1e3, posinf=1e3, neginf=-1e3)
 
 
-def fit_model(model: Model, runs: Sequence[Run], top_mps: float, starts: Sequence[Array], most: int = 50) -> Fit:
-    """The best of the fits from several first guesses: each is begun, the best is gone on with."""
-    begun = [_least(model, runs, top_mps, start, BEGUN) for start in starts] if len(starts) > 1 else []
-    best = min(begun, key=lambda fit: fit.cost) if begun else Fit(model, starts[0], np.inf)
-    if len(starts) > 1:
-        best = _scan_delay(model, runs, top_mps, best)
-    return _least(model, runs, top_mps, best.vector, most)
+def fit_model(model: Model, runs: Sequence[Run], top_mps: float) -> Fit:
+    """The best of the fits from several first guesses: each is begun, the best is gone on with.
 
-
-def _scan_delay(model: Model, runs: Sequence[Run], top_mps: float, fit: Fit) -> Fit:
-    """The same numbers with the delay that suits them best: a descent gets stuck where commands come in steps."""
-    best = fit
+    In between the delay that suits best is looked for: a descent gets stuck where commands come in steps.
+    """
+    best = min((_least(model, runs, top_mps, start, BEGUN) for start in model.starts()), key=lambda fit: fit.cost)
     for delay_s in DELAYS_S:
-        vector = np.append(fit.vector[:-1], delay_s)
+        vector = np.append(best.vector[:-1], delay_s)
         cost = float(np.mean(residuals(model, vector, runs, top_mps) ** 2))
-        if cost < best.cost:
-            best = Fit(model, vector, cost)
-    return best
+        best = Fit(model, vector, cost) if cost < best.cost else best
+    return _least(model, runs, top_mps, best.vector, MOST)
 
 
 def _least(model: Model, runs: Sequence[Run], top_mps: float, start: Array, most: int) -> Fit:
@@ -89,14 +84,6 @@ def _least(model: Model, runs: Sequence[Run], top_mps: float, start: Array, most
         max_nfev=most,
     )
     return Fit(model, found.x, float(np.mean(found.fun**2)))
-
-
-FOLDS = 3
-"""Runs of each kind are dealt out to so many parts; each part is predicted by a fit to the others."""
-AHEAD_S = (1.0, 3.0, 6.0)
-COVERED = 0.99
-JUDGED_EVERY = 3
-"""Steps between the moments from which a run is predicted."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +107,7 @@ class Judged:
     def errors_of(self, column: int, chosen: Callable[[int], bool]) -> Array:
         """Errors at one of `AHEAD_S` of the runs whose numbers are chosen, m."""
         parts = [errors[:, column] for n, errors in enumerate(self.errors_m) if chosen(n)]
-        joined = np.concatenate(parts) if parts else np.zeros(0)
+        joined = np.concatenate([np.zeros(0), *parts])
         return np.asarray(joined[np.isfinite(joined)])
 
     def quantile_m(self, column: int, share: float) -> float:
@@ -146,54 +133,33 @@ class Judged:
 
 def judge(model: Model, runs: Sequence[Run], seen: Seen) -> Judged:
     """Fit a model to all runs, and predict each run by a fit to the others of its kind."""
-    around = model.around(seen)
-    fit = fit_model(around, runs, seen.top_mps, around.starts())
-    parts = _dealt(runs)
+    around, top_mps = model.around(seen), seen.top_mps
+    fit = fit_model(around, runs, top_mps)
+    kinds, dealt, parts = Counter(run.kind for run in runs), Counter[str](), []
+    for run in runs:  # -1: the only one of its kind, which is never left out
+        parts.append(dealt[run.kind] % FOLDS if kinds[run.kind] > 1 else -1)
+        dealt[run.kind] += 1
     fits = {-1: fit}
     for part in sorted(set(parts) - {-1}):
         others = [run for run, its in zip(runs, parts, strict=True) if its != part]
-        fits[part] = fit_model(around, others, seen.top_mps, [fit.vector], most=12)
-    params = {part: around.platform(one.vector, "fitted", seen.top_mps).pack() for part, one in fits.items()}
-    errors = [at_times(params[part], run, fits[part].delay_s) for run, part in zip(runs, parts, strict=True)]
+        fits[part] = _least(around, others, top_mps, fit.vector, HELD)
+    params = {part: around.platform(one.vector, "fitted", top_mps).pack() for part, one in fits.items()}
+    errors = [_at_times(params[part], run, fits[part].delay_s) for run, part in zip(runs, parts, strict=True)]
     return Judged(fit, seen, runs, errors, [part >= 0 for part in parts])
 
 
-def _dealt(runs: Sequence[Run]) -> list[int]:
-    """Part of each run; -1: the only one of its kind, which is never left out."""
-    kinds = [run.kind for run in runs]
-    counts: dict[str, int] = {}
-    parts = []
-    for kind in kinds:
-        counts[kind] = counts.get(kind, -1) + 1
-        parts.append(counts[kind] % FOLDS if kinds.count(kind) > 1 else -1)
-    return parts
-
-
-def at_times(params: Array, run: Run, delay_s: float) -> Array:
+def _at_times(params: Array, run: Run, delay_s: float) -> Array:
     """Errors of places at `AHEAD_S`, (windows, 3), m; of a run shorter than one of them NaN there."""
-    columns = []
     steps = [round(at / STEP_S) for at in AHEAD_S]
-    count = len(errors_of(params, run, delay_s, JUDGED_EVERY, steps[0]))
-    for ahead in steps:
-        distances = distance_m(errors_of(params, run, delay_s, JUDGED_EVERY, ahead)[:, -1:])[:, 0]
-        columns.append(np.concatenate([distances, np.full(count - len(distances), np.nan)]))
-    return np.column_stack(columns)
-
-
-DIGITS = 4
-CHOSEN_BY = 0.9
-WORST_M = 3.0
-"""Held-out errors 3 s ahead beyond this say that the log is not of one boat obeying these commands."""
+    columns = [distance_m(errors_of(params, run, delay_s, JUDGED_EVERY, ahead)[:, -1]) for ahead in steps]
+    found = np.full((len(columns[0]), len(columns)), np.nan)
+    for k, column in enumerate(columns):
+        found[: len(column), k] = column
+    return found
 
 
 def fit_runs(runs: Sequence[Run], kinds: Sequence[str], tell: Callable[[str], None]) -> dict[str, Judged]:
-    """Fit each kind of boat.
-
-    Args:
-        runs: of one boat.
-        kinds: of `MODELS`.
-        tell: is told what is being done.
-    """
+    """Fit each kind of boat, of `MODELS`, to the runs of one boat; ``tell`` is told which."""
     seen, found = Seen.of(runs), {}
     for kind in kinds:
         tell(kind)
@@ -218,9 +184,9 @@ def platform_file(judged: Judged, name: str) -> PlatformFile:
             f"no model predicts these runs: {worst:.1f} m off 3 s ahead, half of the time; is it the log of one boat, "
             "obeying these commands, in still water?"
         )
-    model, vector = judged.fit.model, np.array([_rounded(value) for value in judged.fit.vector])
+    vector = np.array([float(f"{value:.{DIGITS}g}") for value in judged.fit.vector])
     try:
-        platform = model.platform(vector, name, judged.seen.top_mps, proved=True)
+        platform = judged.fit.model.platform(vector, name, judged.seen.top_mps, proved=True)
     except PlatformError as error:
         raise FitError(f"what was fitted cannot be steered ({error}); drive a sea-trial and give its log too") from None
     return PlatformFile(platform, measured_of(judged))
@@ -229,28 +195,23 @@ def platform_file(judged: Judged, name: str) -> PlatformFile:
 def measured_of(judged: Judged) -> dict[str, float]:
     """The section ``measured`` of a file."""
     error, growth = judged.margin()
-    quantiles = {f"error_{at:.0f}_s_m": judged.quantile_m(c, COVERED) for c, at in enumerate(AHEAD_S)}
+    held_out = [out and len(errors) > 0 for out, errors in zip(judged.held_out, judged.errors_m, strict=True)]
     values = {
         "delay_s": judged.fit.delay_s,
         "position_error_m": error,
         "error_growth_mps": growth,
-        **quantiles,
+        **{f"error_{at:.0f}_s_m": judged.quantile_m(c, COVERED) for c, at in enumerate(AHEAD_S)},
         "median_3_s_m": judged.quantile_m(1, 0.5),
         "runs": float(len(judged.runs)),
-        "held_out": float(
-            sum(out and len(errors) > 0 for out, errors in zip(judged.held_out, judged.errors_m, strict=True))
-        ),
+        "held_out": float(sum(held_out)),
     }
     return {key: float(np.ceil(value * 1e3) / 1e3) for key, value in values.items() if np.isfinite(value)}
-
-
-def _rounded(value: float) -> float:
-    return float(f"{value:.{DIGITS}g}")
 
 
 def results_of(found: dict[str, Judged], chosen: str, file: PlatformFile) -> dict[str, Any]:
     """What ``--json`` holds."""
     judged = found[chosen]
+    kinds = [run.kind for run in judged.runs]
     return {
         "kind": chosen,
         "cost": {kind: one.fit.cost for kind, one in found.items()},
@@ -262,16 +223,9 @@ def results_of(found: dict[str, Judged], chosen: str, file: PlatformFile) -> dic
             }
             for kind, one in found.items()
         },
-        "median_3_s_by_manoeuvre_m": {
-            kind: judged.median_of_kind(kind) for kind in sorted({run.kind for run in judged.runs})
-        },
+        "median_3_s_by_manoeuvre_m": {kind: judged.median_of_kind(kind) for kind in sorted(set(kinds))},
         "runs": [
-            {
-                "name": run.name,
-                "seconds": run.seconds,
-                "shows": run.kind,
-                "held_out": judged.held_out[n],
-            }
-            for n, run in enumerate(judged.runs)
+            {"name": run.name, "seconds": run.seconds, "shows": kind, "held_out": held_out}
+            for run, kind, held_out in zip(judged.runs, kinds, judged.held_out, strict=True)
         ],
     }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -11,6 +11,7 @@ from steerclear.shield.jit import Array
 from steerclear.shield.platforms import Gains, Platform, step_boat
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.proving import reference_models
+from steerclear.shield.tracks import thrust_at
 
 from ..jit import kernel
 from .runs import STEP_S, Run
@@ -161,9 +162,7 @@ class Model:
         Raises:
             PlatformError: ``proved``, and it cannot be steered.
         """
-        if proved:
-            return self.build(self.values(vector), name, top_mps)
-        with reference_models():
+        with contextlib.nullcontext() if proved else reference_models():
             return self.build(self.values(vector), name, top_mps)
 
 
@@ -218,17 +217,8 @@ def _relative(heading_deg: float, told_deg: float) -> float:
 def predict(params: Array, thrust: Array, seen: Array, told: Array, every: int, ahead: int, out: Array) -> None:
     """Fill ``out`` (windows, ahead, 4): x, y, unwrapped heading, speed predicted 1, 2, ... steps on.
 
-    Before each step the model is put where the boat was seen, its controllers' memory kept; window w begins at step
-    w * every of the run.
-
-    Args:
-        params: platform row.
-        thrust: (k,) thrust that holds the speed seen, percent: the memory at the start.
-        seen: (k, 5), see `Run`.
-        told: (k, 2) speed and heading that work in each step.
-        every: steps between windows.
-        ahead: steps predicted.
-        out: windows, overwritten.
+    Before each step the model is put where the boat was seen (k, 5), its controllers' memory kept; window w begins at
+    step w * every of the run. Memory begins with the thrust (1,), percent; ``told`` (k, 2) works in each step.
     """
     row, window = np.zeros(L.N_STATE), np.zeros(L.N_STATE)
     row[L.THRUST] = thrust[0]
@@ -256,32 +246,18 @@ def delayed(run: Run, delay_s: float) -> Array:
     return np.column_stack([np.interp(at, steps, column) for column in run.told.T])
 
 
-def windows(run: Run, every: int, ahead: int) -> int:
-    """Number of windows of a run whose whole time was seen."""
-    return max(0, (len(run.seen) - 1 - ahead) // every + 1)
-
-
 def errors_of(params: Array, run: Run, delay_s: float, every: int, ahead: int) -> Array:
     """Foretold less seen, (windows, ahead, 4): x m, y m, heading deg, speed m/s."""
-    from steerclear.shield.tracks import thrust_at
-
-    count = windows(run, every, ahead)
+    count = max(0, (len(run.seen) - 1 - ahead) // every + 1)
     out = np.zeros((count, ahead, 4))
-    if count == 0:
-        return out
-    thrust = np.full(1, thrust_at(params, max(0.0, float(run.seen[0, 3]))))
-    predict(params, thrust, run.seen, delayed(run, delay_s), every, ahead, out)
+    if count:
+        thrust = np.full(1, thrust_at(params, max(0.0, float(run.seen[0, 3]))))
+        predict(params, thrust, run.seen, delayed(run, delay_s), every, ahead, out)
     for w in range(count):
-        begin = w * every + 1
-        out[w] -= run.seen[begin : begin + ahead, :4]
+        out[w] -= run.seen[w * every + 1 :][:ahead, :4]
     return out
 
 
 def distance_m(errors: Array) -> Array:
     """Distances, m, of errors (..., 4)."""
     return np.hypot(errors[..., 0], errors[..., 1])
-
-
-def angle_between(one_deg: float, other_deg: float) -> float:
-    """Difference of two headings, deg in [-180, 180)."""
-    return math.remainder(one_deg - other_deg, 360.0)

@@ -14,7 +14,7 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Generic, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 from ...exceptions import BridgeError
 from ..preflight_checks import CheckResult
@@ -33,17 +33,17 @@ SLOWEST_SYNC_S = 0.5
 _CHUNK = 64 * 1024
 
 Item = TypeVar("Item")
+Taken = TypeVar("Taken", contravariant=True)
 
 
-_ELSEWHERE = "set log_dir to another disk"
 _MEANINGS = {
-    errno.ENOSPC: ("the disk is full", f"free space on it or {_ELSEWHERE}"),
-    errno.EDQUOT: ("the disk quota is used up", f"free space or {_ELSEWHERE}"),
-    errno.EFBIG: ("the file may not grow any further", f"raise the limit on file sizes or {_ELSEWHERE}"),
+    errno.ENOSPC: ("the disk is full", "free space on it or set log_dir to another disk"),
+    errno.EDQUOT: ("the disk quota is used up", "free space or set log_dir to another disk"),
+    errno.EFBIG: ("the file may not grow any further", "raise the limit on file sizes or set log_dir to another disk"),
     errno.EROFS: ("the disk is read-only", "set log_dir to a disk that can be written"),
     errno.EACCES: ("writing there is not allowed", "set log_dir to a folder you may write to"),
     errno.EPERM: ("writing there is not allowed", "set log_dir to a folder you may write to"),
-    errno.EIO: ("the disk fails", _ELSEWHERE),
+    errno.EIO: ("the disk fails", "set log_dir to another disk"),
     errno.EEXIST: ("the file exists already", "give a name that is not taken"),
     errno.ENOENT: ("the folder does not exist", "create it or set log_dir to another folder"),
     errno.ENOTDIR: ("the folder is a file", "set log_dir to a folder"),
@@ -52,8 +52,10 @@ _MEANINGS = {
 
 def explain(error: OSError) -> str:
     """What an error of the file system means, and the remedy, in one line."""
-    unknown = (f"writing failed ({error.strerror or error})", _ELSEWHERE)
-    return "; ".join(_MEANINGS.get(error.errno or 0, unknown))
+    meaning, remedy = _MEANINGS.get(
+        error.errno or 0, (f"writing failed ({error.strerror or error})", "set log_dir to another disk")
+    )
+    return f"{meaning}; {remedy}"
 
 
 class Disk:
@@ -122,26 +124,20 @@ class Disk:
             self._file = None
 
 
-class Store(Generic[Item]):
-    """What the writer's thread, and nobody else, does with things, and the file it keeps them in."""
+class Store(Protocol[Taken]):
+    """What the thread does with things; only ever called from that thread."""
 
-    def __init__(self, disk: Disk) -> None:
-        self.disk = disk
-
-    def keep(self, item: Item) -> None:
+    def keep(self, item: Taken) -> None:
         """Take one thing."""
-        raise NotImplementedError
 
     def flush(self) -> None:
         """Bring what was taken to the disk."""
-        self.disk.flush()
-        self.disk.sync()
 
     def finish(self) -> None:
         """Complete and close the file."""
-        self.disk.flush()
-        self.disk.sync()
-        self.disk.close()
+
+    def abandon(self) -> None:
+        """Close the file as it is."""
 
 
 class AsyncWriter(Generic[Item]):
@@ -186,13 +182,9 @@ class AsyncWriter(Generic[Item]):
         try:
             self._queue.put_nowait((active_s, item))
         except queue.Full:
-            if self.dropped == 0:
-                LOG.warning(
-                    "the log %s: the disk is too slow, %d entries wait, more are dropped", self.name, self.waiting
-                )
-            self.dropped += 1
+            self._drop()
         stuck_s = active_s - self._progress_s
-        if stuck_s > self._give_up_s and self.waiting > 1:
+        if stuck_s > self._give_up_s and self._queue.qsize() > 1:
             raise BridgeError(
                 f"the log {self.name}: the disk has taken nothing for {stuck_s:.0f} s; check it or set log_dir to "
                 "another disk"
@@ -223,6 +215,11 @@ class AsyncWriter(Generic[Item]):
         """Time in which things were handed over, s: see `PAUSE_S`."""
         active_s, handed_s = self._handed
         return active_s + min(time.monotonic() - handed_s, PAUSE_S)
+
+    def _drop(self) -> None:
+        if self.dropped == 0:
+            LOG.warning("the log %s: the disk is too slow, %d entries wait, more are dropped", self.name, self.waiting)
+        self.dropped += 1
 
     def _run(self) -> None:
         try:
@@ -259,24 +256,42 @@ class AsyncWriter(Generic[Item]):
 
     def _next(self, wait_s: float) -> tuple[float, Item] | None:
         try:
-            return self._queue.get(block=wait_s > 0.0, timeout=max(0.0, wait_s))
+            return self._queue.get(timeout=max(0.0, wait_s)) if wait_s > 0.0 else self._queue.get_nowait()
         except queue.Empty:
             return None
 
     def _fail(self, fault: str) -> None:
         self.fault = fault
         LOG.error("%s", fault)
-        with contextlib.suppress(OSError):
-            self._store.disk.close()
+        try:
+            self._store.abandon()
+        except OSError:
+            LOG.debug("closing %s", self.name, exc_info=True)
         while self._next(0.0) is not None:
             pass
 
 
-class _TlogFile(Store[tuple[str, bytes, int]]):
+class _TlogFile:
+    """The file; used by the writer's thread only."""
+
+    def __init__(self, disk: Disk) -> None:
+        self._disk = disk
+
     def keep(self, item: tuple[str, bytes, int]) -> None:
         direction, frame, unix_us = item
         link = 1 if direction == "out" else 0  # the two lowest bits of the time tell links apart
-        self.disk.write(struct.pack(">Q", (max(0, unix_us) & ~3) | link) + frame)
+        self._disk.write(struct.pack(">Q", (max(0, unix_us) & ~3) | link) + frame)
+
+    def flush(self) -> None:
+        self._disk.flush()
+        self._disk.sync()
+
+    def finish(self) -> None:
+        self.flush()
+        self._disk.close()
+
+    def abandon(self) -> None:
+        self._disk.close()
 
 
 class TlogWriter(AsyncWriter[tuple[str, bytes, int]]):
@@ -319,7 +334,7 @@ def check_disk(folder: Path, *, boats: int, minutes: float = 120.0, name: str = 
         minutes: how long must fit.
         name: of the check.
     """
-    needed_mib = boats * minutes * 60.0 * BYTES_PER_BOAT_S / 2**20
+    needed = boats * minutes * 60.0 * BYTES_PER_BOAT_S
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder) as file:  # the time that the disk takes to keep a second's worth of log
@@ -328,13 +343,15 @@ def check_disk(folder: Path, *, boats: int, minutes: float = 120.0, name: str = 
             file.flush()
             os.fsync(file.fileno())
             sync_s = time.monotonic() - started
-        free_mib = float(shutil.disk_usage(folder).free) / 2**20
+        free = float(shutil.disk_usage(folder).free)
     except OSError as error:
         return CheckResult(name, False, f"{folder}: {explain(error)}")
-    figures = {"free_mib": free_mib, "needed_mib": needed_mib, "sync_s": sync_s}
-    text = f"{folder}: {free_mib:.0f} MiB free, {needed_mib:.0f} MiB needed for {minutes:g} min"
-    if free_mib < needed_mib:
-        text = f"{text}; free space"
-    elif sync_s > SLOWEST_SYNC_S:
+    figures = {"free_mib": free / 2**20, "needed_mib": needed / 2**20, "sync_s": sync_s}
+    if free < needed:
+        text = f"{folder}: {free / 2**20:.0f} MiB free, {needed / 2**20:.0f} MiB needed for {minutes:g} min; free space"
+        return CheckResult(name, False, text, figures)
+    if sync_s > SLOWEST_SYNC_S:
         text = f"{folder}: the disk takes {sync_s:.1f} s to keep 64 KiB; set log_dir to a faster one"
-    return CheckResult(name, free_mib >= needed_mib and sync_s <= SLOWEST_SYNC_S, text, figures)
+        return CheckResult(name, False, text, figures)
+    text = f"{folder}: {free / 2**20:.0f} MiB free, {needed / 2**20:.0f} MiB needed for {minutes:g} min"
+    return CheckResult(name, True, text, figures)

@@ -1,5 +1,8 @@
 """Fleet files, policies in files, and snapshots of simulated games."""
 
+import contextlib
+import os
+import pty
 import textwrap
 
 import numpy as np
@@ -70,3 +73,13 @@ def write_entry(tmp_path):
         return str(folder)
 
     return write
+
+
+@pytest.fixture
+def terminal():
+    """A pseudo terminal: (the end a person types at, the end the program reads)."""
+    outer, inner = pty.openpty()
+    yield outer, inner
+    for descriptor in (outer, inner):
+        with contextlib.suppress(OSError):
+            os.close(descriptor)

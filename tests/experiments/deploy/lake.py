@@ -2,11 +2,11 @@
 
 import contextlib
 import math
-import socket
 import threading
 import time
 
 import numpy as np
+from steerclear.experiments.deploy.demo import free_ports
 from steerclear.experiments.sim_boats import AutopilotSettings, SimBoat, SimFleet
 from steerclear.shield import Commands
 from steerclear.shield.bridge.blackbox import McapWriter, header_of_fleet, log_path
@@ -53,9 +53,7 @@ class Lake:
     """Two boats and what commands them; what links count and the loop declares, with the time of the first."""
 
     def __init__(self, folder, signed=False, *, text=TEXT, starts=STARTS, wants=HEAD_ON, boxed=False, **water):
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            probe.bind(("127.0.0.1", 0))
-            self.port = probe.getsockname()[1]
+        (self.port,) = free_ports(1)
         address = f"udpin:127.0.0.1:{self.port}"
         link = f'link: {{kind: mavlink, address: "{address}", system_id: %d}}'
         boats = "".join(

@@ -188,11 +188,6 @@ def stale(tick, limits) -> list[str]:
     return found
 
 
-def kinds(breaches: list[dict]) -> Counter:
-    """How many breaches of which kind, verdict and circumstance."""
-    return Counter((circumstance(breach), breach["kind"], breach["verdict"]) for breach in breaches)
-
-
 def circumstance(breach: dict) -> str:
     """What held our boats when it happened."""
     if breach["after_run"]:
@@ -203,36 +198,29 @@ def circumstance(breach: dict) -> str:
 
 
 def summary(results: list[dict]) -> str:
-    """Lines for a person: a part each, and the sum."""
+    """Lines for a person: a part each, and the sum of those with and without the shield."""
     lines = []
     for result in results:
         part, runners = result["part"], result["runners"]
+        worst = {key: 1e3 * max(r[key] for r in runners) for key in ("jitter_p999_s", "read_to_sent_p99_s")}
+        counts = {
+            key: sum(r[key] for r in runners) for key in ("commands_without_answer", "decided_the_same", "decisions")
+        }
         lines.append(
-            f"{part['name']}: {result['minutes_played']:.1f} min {part['platform']} {part['policy']} against "
-            f"{part['opponents']}{'' if part['shielded'] else ', UNSHIELDED'}: mates {result['closest_mate_m']:.2f} m, "
-            f"opponents {result['closest_opponent_m']:.2f} m, {len(result['breaches'])} breaches, jitter p99.9 "
-            f"{1e3 * max(r['jitter_p999_s'] for r in runners):.1f} ms, read to sent p99 "
-            f"{1e3 * max(r['read_to_sent_p99_s'] for r in runners):.1f} ms, load {result['load_average_after']:.1f}, "
-            f"{sum(r['commands_without_answer'] for r in runners)} stale commands, "
-            f"{sum(r['decided_the_same'] for r in runners)} of {sum(r['decisions'] for r in runners)} replayed the same"
+            f"{part['name']}: {result['minutes_played']:.1f} min, mates {result['closest_mate_m']:.2f} m, opponents "
+            f"{result['closest_opponent_m']:.2f} m, {len(result['breaches'])} breaches, jitter p99.9 "
+            f"{worst['jitter_p999_s']:.1f} ms, read to sent p99 {worst['read_to_sent_p99_s']:.1f} ms, load "
+            f"{result['load_average_after']:.1f}, {counts['commands_without_answer']} stale commands, "
+            f"{counts['decided_the_same']} of {counts['decisions']} replayed the same"
         )
-        lines += [f"   {number} x {', '.join(what)}" for what, number in sorted(kinds(result["breaches"]).items())]
+        kinds = Counter((circumstance(breach), breach["kind"], breach["verdict"]) for breach in result["breaches"])
+        lines += [f"   {number} x {', '.join(what)}" for what, number in sorted(kinds.items())]
     for shielded in (True, False):
         chosen = [result for result in results if result["part"]["shielded"] == shielded]
-        if chosen:
-            lines.append(total(chosen, "shielded" if shielded else "unshielded"))
+        during = [breach for result in chosen for breach in result["breaches"] if not breach["after_run"]]
+        minutes = sum(result["minutes_played"] for result in chosen)
+        kinds = Counter((breach["kind"], breach["verdict"]) for breach in during)
+        lines.append(
+            f"{'shielded' if shielded else 'unshielded'}: {minutes:.1f} min, breaches during runs: {dict(kinds)}"
+        )
     return "\n".join(lines)
-
-
-def total(results: list[dict], words: str) -> str:
-    """The sum of some parts, a line."""
-    minutes = sum(result["minutes_played"] for result in results)
-    during = [breach for result in results for breach in result["breaches"] if not breach["after_run"]]
-    mates = sum(breach["kind"] == "teammate" for breach in during)
-    avoidable = sum(breach["kind"] == "opponent" and breach["verdict"] == "avoidable" for breach in during)
-    after = sum(breach["after_run"] for result in results for breach in result["breaches"])
-    return (
-        f"{words}: {minutes:.1f} min, {len(during)} breaches during runs ({len(during) / minutes:.2f} a minute): "
-        f"{mates} of teammates, {len(during) - mates} with opponents, {avoidable} of these avoidable; "
-        f"{after} after runs"
-    )

@@ -7,12 +7,12 @@ import contextlib
 import json
 import re
 import shutil
-import socket
 import subprocess
 import sys
 import time
 
 import pytest
+from steerclear.experiments.deploy.demo import free_ports
 
 pytestmark = pytest.mark.study
 PROGRAM = [sys.executable, "-m", "steerclear.experiments.cli"]
@@ -34,12 +34,6 @@ boats:
   - {name: red_1, agent: agent_1, platform: heron, contact: feed}
 feed: {listen: "127.0.0.1:FEED"}
 """
-
-
-def free_port():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return str(probe.getsockname()[1])
 
 
 def steerclear(folder, *arguments, status=0):
@@ -70,14 +64,30 @@ def boats(folder, *more):
 
 @pytest.fixture
 def folder(tmp_path):
-    (tmp_path / "FLEET.yaml").write_text(FLEET.replace("LINK", free_port()).replace("FEED", free_port()))
+    link, feed = free_ports(2)
+    (tmp_path / "FLEET.yaml").write_text(FLEET.replace("LINK", str(link)).replace("FEED", str(feed)))
     return tmp_path
 
 
-def test_a_demonstration_is_played_and_its_log_is_proved(tmp_path):
-    said = steerclear(tmp_path, "deploy", "--demo", "--plain", "--minutes", "0.3", "--json", "run.json")
-    for words in ("turns", "commands changed by the shield", "turns missed", "blue_1: in HOLD", "commands changed"):
+SOLUTION = """
+class solution:
+    def compute_action(self, agent_id, full_obs_normalized, full_obs, global_state):
+        bearing = float(full_obs[agent_id]["opponent_home_bearing"])
+        turns = [180, 135, 90, 45, 0, -45, -90, -135]
+        return min(range(8), key=lambda k: abs((bearing - turns[k] + 180) % 360 - 180))
+"""
+
+
+@pytest.mark.parametrize("link", ["mavlink", "moos"])
+def test_a_submission_plays_a_demonstration_and_its_log_is_proved(tmp_path, link):
+    (tmp_path / "our_team").mkdir()
+    (tmp_path / "our_team" / "solution.py").write_text(SOLUTION, encoding="utf-8")
+    options = ("--policy", "our_team", "--minutes", "0.4", "--plain", "--json", "run.json")
+    said = steerclear(tmp_path, "deploy", "--demo", "--link", link, *options)
+    assert ("moosdb:blue_1" in said) == (link == "moos")
+    for words in ("turns", "commands changed by the shield", "turns missed", "commands changed"):
         assert words in said
+    assert link == "moos" or "blue_1: in HOLD" in said
     content = json.loads((tmp_path / "run.json").read_text())
     assert content["refused"] == []
     assert content["figures"]["ticks"] > 100
@@ -85,7 +95,7 @@ def test_a_demonstration_is_played_and_its_log_is_proved(tmp_path):
     assert (folder / "FLEET.yaml").exists()
     (log,) = folder.glob("logs/*.mcap")
     assert content["log"].endswith(log.name)
-    assert log.with_suffix(".tlog").exists()
+    assert link == "moos" or log.with_suffix(".tlog").exists()
     assert "the same bit for bit" in steerclear(tmp_path, "replay", str(log))
     shutil.copyfile(log, tmp_path / "cut.mcap")
     with (tmp_path / "cut.mcap").open("r+b") as file:

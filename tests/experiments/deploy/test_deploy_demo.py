@@ -27,12 +27,12 @@ with Demo(Path(sys.argv[1]), "medium") as demo:
 """
 
 
+def ports_in(text):
+    return {int(port) for port in re.findall(r"127\.0\.0\.1:(\d+)", text)}
+
+
 def ports_of(path):
-    return {int(port) for port in re.findall(r"127\.0\.0\.1:(\d+)", path.read_text())}
-
-
-def test_the_ports_replaced_are_those_of_the_file():
-    assert {int(port) for port in re.findall(r"127\.0\.0\.1:(\d+)", demo_text())} == set(PORTS)
+    return ports_in(path.read_text())
 
 
 def test_every_demonstration_has_a_folder_and_ports_of_its_own(tmp_path):
@@ -43,9 +43,7 @@ def test_every_demonstration_has_a_folder_and_ports_of_its_own(tmp_path):
         assert load_fleet(path).team == "blue"
         assert len(ports_of(path)) == 3
     assert not ports_of(first) & set(PORTS)
-
-
-def test_a_folder_that_cannot_be_written_is_said(tmp_path):
+    assert ports_in(demo_text()) == set(PORTS), "the ports replaced are those of the file"
     (tmp_path / "file").write_text("")
     with pytest.raises(BridgeError, match="cannot write"):
         demo_file(tmp_path / "file")
@@ -54,20 +52,13 @@ def test_a_folder_that_cannot_be_written_is_said(tmp_path):
 def test_a_demonstration_that_cannot_begin_says_why_and_leaves_nothing(tmp_path):
     path = tmp_path / "FLEET.yaml"
     path.write_text("version: 2")
+    (tmp_path / "boats.txt").write_text("said before")
     with Demo(path, "medium") as demo:
         with pytest.raises(BridgeError, match=r"ended: .*version"):
             demo.wait(60.0)
         processes = list(demo._processes.values())
     assert all(process.poll() is not None for process in processes)
-
-
-def test_what_an_earlier_demonstration_said_is_kept(tmp_path):
-    path = tmp_path / "FLEET.yaml"
-    path.write_text("version: 2")
-    (tmp_path / "boats.txt").write_text("said before")
-    with Demo(path, "medium"):
-        pass
-    assert (tmp_path / "boats.txt").read_text() == "said before"
+    assert (tmp_path / "boats.txt").read_text() == "said before", "what an earlier one said is kept"
 
 
 def is_alive(pid):

@@ -1,6 +1,7 @@
-"""Lines instead of a dashboard, logs that never make the loop wait, counts of a run, the demonstration's processes."""
+"""Lines instead of a dashboard and of checks, logs that never make the loop wait, counts of a run, its priority."""
 
 import dataclasses
+import io
 import logging
 import math
 import os
@@ -12,20 +13,24 @@ import time
 
 import numpy as np
 import pytest
-from deploy_ticks import Stream
+from made_ticks import Stream
+from rich.console import Console
+from steerclear.experiments.cli_boats import show_check
 from steerclear.experiments.deploy.keys import FIGURES, figure_rows
-from steerclear.experiments.deploy.plain import PlainLines, Tally, closest_m, logging_aside
+from steerclear.experiments.deploy.plain import PlainLines, Tally, closest_m
 from steerclear.experiments.deploy.quiet import (
     LOOP_FIRST,
     OTHERS_FIRST,
     before_others,
     ended_by_signals,
+    logging_aside,
     undisturbed,
     warm_up,
 )
 from steerclear.shield import Commands, Shield, ShieldConfig, decide
 from steerclear.shield.bridge.messages import Action
 from steerclear.shield.bridge.operator import Operator
+from steerclear.shield.bridge.preflight_checks import CheckResult
 from steerclear.shield.fleet import Fleet
 
 
@@ -35,50 +40,36 @@ def ticks(fleet_of):
     return [stream.tick() for _ in range(5)]
 
 
-def told(lines, seconds=10.0):
-    end = time.monotonic() + seconds
+def said_of(ticks, every_s=0.3):
+    """Lines about ticks, once the first has come."""
+    lines, end = [], time.monotonic() + 10.0
+    sink = PlainLines(lines.append, every_s)
+    for tick in ticks:
+        sink.take(tick)
     while not lines and time.monotonic() < end:
         time.sleep(0.01)
+    sink.close()
     return lines
 
 
-def test_lines_say_how_it_goes(ticks):
-    lines = []
-    sink = PlainLines(lines.append, every_s=0.02)
-    sink.take(type(ticks[0])(**{**vars(ticks[0]), "actions": (Action("red_1", "contact", "slow", "red_1 old"),)}))
-    said = told(lines)
-    sink.close()
-    assert "closest" in said[0]
-    assert any("red_1 old" in line for line in lines)
-
-
 def test_a_line_counts_all_that_happened_since_the_last_one(ticks):
-    lines = []
-    sink = PlainLines(lines.append, every_s=0.3)
-    for tick in ticks:
-        sink.take(tick)
-    said = told(lines)
-    sink.close()
+    action = Action("red_1", "contact", "slow", "red_1 old")
+    lines = said_of([*ticks[:-1], dataclasses.replace(ticks[-1], actions=(action,))])
     commands = sum(int(tick.fleet.controlled.sum()) for tick in ticks)
     changed = sum(tick.decisions.count_intervened for tick in ticks)
     closest = min(closest_m(tick.fleet) for tick in ticks)
-    assert f"closest {closest:5.1f} m, {changed} of {commands} commands changed" in said[0]
+    assert f"closest {closest:5.1f} m, {changed} of {commands} commands changed" in lines[0]
     assert len(ticks) > 1 < commands
+    assert "red_1 old" in lines[1]
 
 
-def test_a_boat_alone_has_no_closest_approach(fleet_of):
-    tick = Stream(fleet_of(2)).tick()
-    fleet = tick.fleet
+def test_a_boat_alone_has_no_closest_approach(ticks):
+    fleet = ticks[0].fleet
     one = Fleet(fleet.state[:1], fleet.team[:1], fleet.platforms[:1], fleet.controlled[:1], fleet.names[:1])
-    guard = Shield(ShieldConfig())
-    alone = dataclasses.replace(tick, fleet=one, decisions=guard.decide(one, Commands.relative_deg([[1.0, 0.0]])))
-    lines = []
-    sink = PlainLines(lines.append, every_s=0.02)
-    sink.take(alone)
-    said = told(lines)
-    sink.close()
-    assert "no other boat, " in said[0]
-    assert "inf" not in said[0]
+    decisions = Shield(ShieldConfig()).decide(one, Commands.relative_deg([[1.0, 0.0]]))
+    (line,) = said_of([dataclasses.replace(ticks[0], fleet=one, decisions=decisions)], 0.02)[:1]
+    assert "no other boat, " in line
+    assert "inf" not in line
     rows = dict(figure_rows({figure.key: 3.456 for figure in FIGURES} | {"closest_m": math.inf}))
     assert rows["closest approach of our boats, as believed"] == "no other boat"
     assert rows["turn began late, 999 of 1000 within"] == "3456.0 ms"
@@ -87,6 +78,8 @@ def test_a_boat_alone_has_no_closest_approach(fleet_of):
 def test_what_lasts_is_said_once_whatever_its_figures_and_again_when_its_response_changes(ticks):
     lines = []
     sink = PlainLines(lines.append, every_s=0.05)
+    time.sleep(0.1)
+    assert lines == [], "nothing is said before the first tick"
     for response, ages in (("slow", (1.0, 1.5, 2.0)), ("stop", (5.0, 5.5))):
         for age in ages:
             action = Action("red_1", "contact", response, f"red_1 {age} s old")
@@ -99,12 +92,22 @@ def test_what_lasts_is_said_once_whatever_its_figures_and_again_when_its_respons
     assert said[1] in {f"red_1 {age} s old" for age in (5.0, 5.5)}
 
 
-def test_nothing_is_said_before_the_first_tick():
-    lines = []
-    sink = PlainLines(lines.append, every_s=0.01)
-    time.sleep(0.1)
-    sink.close()
-    assert lines == []
+@pytest.mark.parametrize(
+    ("passed", "accepted", "mark"),
+    [
+        (True, (), "ok"),
+        (True, ("drill",), "ok"),
+        (False, (), "FAIL"),
+        (False, ("rates",), "FAIL"),
+        (False, ("drill",), "not passed, accepted:"),
+        (False, ("drill:blue_1",), "not passed, accepted:"),
+    ],
+)
+def test_a_check_that_was_accepted_beforehand_does_not_read_as_a_failure(passed, accepted, mark):
+    stream = io.StringIO()
+    show_check(Console(file=stream, width=80), CheckResult("drill:blue_1", passed, "42 [s] ago"), accepted)
+    assert stream.getvalue().split("drill:blue_1")[0].strip() == mark
+    assert "drill:blue_1: 42 [s] ago" in stream.getvalue()
 
 
 def test_every_stage_of_a_decision_runs_before_boats_move(fleet_of, monkeypatch):
@@ -116,35 +119,25 @@ def test_every_stage_of_a_decision_runs_before_boats_move(fleet_of, monkeypatch)
     assert seen == stages
 
 
-def test_logs_go_to_the_file(tmp_path):
-    path = tmp_path / "logs" / "run.log"
-    before = list(logging.getLogger().handlers)
+def test_logs_go_to_the_file_and_an_empty_one_is_not_left(tmp_path):
+    path, empty, before = tmp_path / "logs" / "run.log", tmp_path / "empty.log", list(logging.getLogger().handlers)
     with logging_aside(path, shown=False):
         logging.getLogger("steerclear.test").warning("override of %s", "red_1")
     assert "override of red_1" in path.read_text()
     assert logging.getLogger().handlers == before
+    with logging_aside(empty, shown=False):
+        assert empty.exists(), "it could be made"
+    assert not empty.exists()
 
 
-def test_a_run_of_which_nothing_was_logged_leaves_no_empty_file(tmp_path):
-    path = tmp_path / "run.log"
-    with logging_aside(path, shown=False):
-        assert path.exists(), "it could be made"
-    assert not path.exists()
-
-
-def test_a_run_is_counted(ticks):
+def test_a_run_is_counted_and_turns_with_a_response_are_those_in_which_something_was_done(ticks):
     tally = Tally()
     for tick in ticks:
         tally.take(tick)
-    figures = tally.figures()
-    at = ticks[-1].fleet.state[:, :2]
+    figures, at = tally.figures(), ticks[-1].fleet.state[:, :2]
     assert figures["ticks"] == figures["decided"] == 5.0
     assert figures["closest_m"] <= np.hypot(*(at[0] - at[1])) + 1e-9
     assert 0.0 <= figures["changed_share"] <= 1.0
-    assert Tally().figures()["ticks"] == 0.0
-
-
-def test_turns_with_a_response_are_those_in_which_something_was_done(ticks):
     tally = Tally()
     for response in ("none", "none", "slow", "stop"):
         tally.take(dataclasses.replace(ticks[0], actions=(Action("blue_1", "model", response, "off its model"),)))
@@ -167,81 +160,23 @@ def scheduled():
     return os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK, os.sched_getparam(0).sched_priority
 
 
-def in_a_thread(act):
-    """What is returned in a thread of its own: what it does to its scheduling ends with it."""
-    answers = []
-    thread = threading.Thread(target=lambda: answers.append(act()))
-    thread.start()
-    thread.join(20.0)
-    return answers[0]
-
-
-def may_go_first():
-    """Whether this system lets a program go before others."""
-
-    def go_first():
-        try:
-            os.sched_setscheduler(0, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(LOOP_FIRST))
-        except OSError:
-            return False
-        return True
-
-    return in_a_thread(go_first)
-
-
-AT_FIRST = os.sched_getscheduler(0)
-GOES_FIRST = pytest.mark.skipif(not may_go_first(), reason="this system gives no program real-time priority")
-
-
-def test_asking_what_the_system_allows_leaves_these_tests_as_they_were():
-    assert may_go_first() in (True, False)
-    assert os.sched_getscheduler(0) == AT_FIRST
-
-
 def test_what_makes_a_run_quiet_is_taken_back_and_not_handed_on():
     before, plain = sys.getswitchinterval(), scheduled()
     question = "import os; print(os.sched_getscheduler(0))"
     with undisturbed():
         assert sys.getswitchinterval() < before
+        assert scheduled() in (plain, (os.SCHED_RR, LOOP_FIRST)), "as far as the system lets it"
         told = subprocess.run([sys.executable, "-c", question], capture_output=True, check=True, text=True).stdout
         assert int(told) & ~os.SCHED_RESET_ON_FORK == os.SCHED_OTHER
     assert sys.getswitchinterval() == pytest.approx(before)
     assert scheduled() == plain
 
 
-@GOES_FIRST
-def test_the_loop_goes_before_all_other_programs_and_the_runners_threads_after_it():
-    seen, ends = [], threading.Event()
-
-    def look():
-        ends.wait(20.0)
-        seen.append(scheduled())
-
-    thread = threading.Thread(target=look)
-    thread.start()
-    with undisturbed():
-        assert scheduled() == (os.SCHED_RR, LOOP_FIRST)
-        ends.set()
-        thread.join(20.0)
-    assert seen == [(os.SCHED_RR, OTHERS_FIRST)]
-
-
-@GOES_FIRST
-def test_a_run_that_goes_before_others_already_is_not_put_back_and_is_left_as_it_was():
-    def run():
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(7))
-        with undisturbed():
-            seen = scheduled()
-        return seen, (os.sched_getscheduler(0), os.sched_getparam(0).sched_priority)
-
-    assert in_a_thread(run) == ((os.SCHED_FIFO, 7), (os.SCHED_FIFO, 7))
-
-
 class System:
     """Threads and what they were given; some may not be given more than a priority, some have ended."""
 
     def __init__(self, monkeypatch, tasks, most=99, gone=()):
-        self.given, self.most, self.gone = dict.fromkeys(tasks, (os.SCHED_BATCH, 0)), most, gone
+        self.given, self.most, self.gone = dict(tasks), most, gone
         monkeypatch.setattr("steerclear.experiments.deploy.quiet._tasks", lambda: list(self.given))
         monkeypatch.setattr(os, "sched_getscheduler", lambda task: self._of(task)[0])
         monkeypatch.setattr(os, "sched_getparam", lambda task: os.sched_param(self._of(task)[1]))
@@ -259,24 +194,13 @@ class System:
         self.given[task] = policy & ~os.SCHED_RESET_ON_FORK, parameter.sched_priority
 
 
-def test_a_thread_that_has_just_ended_keeps_no_other_from_going_first(monkeypatch):
-    own = threading.get_native_id()
-    system = System(monkeypatch, [1, own, 2], gone=(1,))
+@pytest.mark.parametrize("most", [99, OTHERS_FIRST, 0])
+def test_the_loop_goes_first_the_runners_other_threads_after_it_or_nobody(monkeypatch, most):
+    own, plain = threading.get_native_id(), (os.SCHED_BATCH, 0)
+    tasks = {1: plain, own: plain, 2: plain, 3: (os.SCHED_FIFO, 7)}
+    system = System(monkeypatch, tasks, most, gone=(1,))
+    first, others = ((os.SCHED_RR, LOOP_FIRST), (os.SCHED_RR, OTHERS_FIRST)) if most > OTHERS_FIRST else (plain, plain)
     with before_others():
-        assert (system.given[own], system.given[2]) == ((os.SCHED_RR, LOOP_FIRST), (os.SCHED_RR, OTHERS_FIRST))
-    assert set(system.given.values()) == {(os.SCHED_BATCH, 0)}, "as they were"
-
-
-def test_no_thread_goes_first_where_the_loop_may_not(monkeypatch):
-    system = System(monkeypatch, [1, threading.get_native_id(), 2], most=OTHERS_FIRST)
-    with before_others():
-        assert set(system.given.values()) == {(os.SCHED_BATCH, 0)}, "the others would make the loop wait"
-
-
-def test_a_system_that_allows_nothing_is_no_fault(monkeypatch):
-    def refuse(*_):
-        raise PermissionError
-
-    monkeypatch.setattr(os, "sched_setscheduler", refuse)
-    with undisturbed():
-        assert scheduled()[0] == os.SCHED_OTHER
+        assert (system.given[own], system.given[2]) == (first, others), "else they would make the loop wait"
+        assert system.given[3] == (os.SCHED_FIFO, 7), "it has more already"
+    assert system.given == tasks, "as they were"

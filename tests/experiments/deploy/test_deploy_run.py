@@ -8,6 +8,7 @@ import threading
 import pytest
 from steerclear.env.core import BatchedMctf
 from steerclear.experiments.cli import app
+from steerclear.experiments.deploy.demo import free_ports
 from steerclear.experiments.deploy.orders import Orders, Surface, read_fleet
 from steerclear.experiments.deploy.plain import Tally
 from steerclear.experiments.deploy.preflight_file import check_drill, keep, measured_delay_s, path_of
@@ -28,16 +29,6 @@ from typer.testing import CliRunner
 
 SPEED = 5.0
 LIMITS = "{navigation: {max_age_s: 2.0, then: stop, lost_after_s: 5.0}, contact: {max_age_s: 3.0, then: slow}}"
-
-
-def free_ports(count):
-    sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(count)]
-    for entry in sockets:
-        entry.bind(("127.0.0.1", 0))
-    ports = [entry.getsockname()[1] for entry in sockets]
-    for entry in sockets:
-        entry.close()
-    return ports
 
 
 @pytest.fixture
@@ -155,12 +146,9 @@ def taken(path, kind):
     return entry
 
 
-def test_a_boat_that_does_not_answer_is_named(fleet_file):
+def test_a_boat_that_does_not_answer_and_an_unknown_check_to_accept_are_named(fleet_file):
     with pytest.raises(LinkError, match="blue_1"):
         preflight(orders_of(fleet_file, connect_s=0.5))
-
-
-def test_an_unknown_check_to_accept_is_refused(fleet_file, boats):
     with pytest.raises(ConfigError, match="no such check"):
         preflight(orders_of(fleet_file, accept=("latencies",)))
 
@@ -257,9 +245,11 @@ def test_a_mistake_is_one_line_and_exit_2_before_any_packet(fleet_file, no_packe
     assert not list(fleet_file.parent.rglob("*.mcap")), "nothing was begun"
 
 
-def test_a_sound_file_gets_as_far_as_packets(fleet_file, no_packet):
+def test_a_sound_file_gets_as_far_as_packets_and_none_is_said(fleet_file, no_packet):
     with pytest.raises(RuntimeError, match="packets were sent"):
         deploy(orders_of(fleet_file, connect_s=1.0))
+    result = CliRunner().invoke(app, ["deploy"])
+    assert (result.exit_code, "--demo" in result.stderr) == (2, True)
 
 
 @pytest.mark.parametrize("command", ["deploy", "preflight"])
@@ -285,6 +275,8 @@ def test_with_a_bad_file_nothing_is_sent_to_any_boat(fleet_file, boats, name):
     ["[]", "{", "{}", "1", "[" * 5000, '{"checks": [1], "refused": [], "unix_s": 1}', "\u00e9",
      '{"fleet": "", "checks": [{"name": "response:blue_1", "passed": true, "text": "", "figures": {"delay_s": "x"}}], '
      '"refused": [], "unix_s": 1}',
+     '{"fleet": "", "checks": [{"name": "response:blue_1", "passed": true, "text": "", "figures": {"delay_s": NaN}}], '
+     '"refused": [], "unix_s": 1}',
      '{"fleet": "", "checks": [], "refused": [[]], "unix_s": 1}',
      '{"fleet": "", "checks": [], "refused": [], "unix_s": "now"}'],
 )  # fmt: skip
@@ -306,11 +298,6 @@ def test_every_key_of_the_json_is_documented(fleet_file, boats, tmp_path):
     assert undocumented(content, KEYS["preflight"]) == []
     figures = {**Timing().figures(), **Tally().figures(), "missed_turns": 0.0}
     assert undocumented({"figures": figures}, KEYS["deploy"]) == []
-
-
-def test_no_file_and_no_demo_is_said():
-    result = CliRunner().invoke(app, ["deploy"])
-    assert (result.exit_code, "--demo" in result.stderr) == (2, True)
 
 
 def good(kind, passed=True, **figures):
@@ -366,20 +353,20 @@ def test_without_a_drill_a_step_of_delay_is_assumed_and_a_declared_one_is_kept(f
     assert read_fleet(orders_of(fleet_file, untold_delay_s=0.0))[0].shield_config.delay_s == 0.4
 
 
-def test_a_boat_that_is_nobodys_is_named(fleet_file):
-    text = fleet_file.read_text().replace("agent: agent_0, ", "").replace("agent: agent_0\n", "\n")
-    fleet_file.write_text(text.replace("agent: agent_1, ", ""))
-    with pytest.raises(FleetFileError, match="blue_1 has a link but no agent or team; add team: blue to command it"):
-        read_fleet(orders_of(fleet_file))
-
-
-def test_nothing_to_command_is_said(fleet_file):
-    fleet_file.write_text(fleet_file.read_text().replace("system_id: 1}", "system_id: 1}\n    commanded: false"))
-    with pytest.raises(FleetFileError, match="has a link"):
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("agent: agent_0\n", "\n", "blue_1 has a link but no agent or team; add team: blue to command it"),
+        ("system_id: 1}", "system_id: 1}\n    commanded: false", "has a link"),
+    ],
+)
+def test_a_file_with_nothing_to_command_says_why(fleet_file, old, new, said):
+    text = fleet_file.read_text().replace(old, new)
+    fleet_file.write_text(text if "commanded" in new else text.replace("agent: agent_1, ", ""))
+    with pytest.raises(FleetFileError, match=said):
         read_fleet(orders_of(fleet_file))
 
 
 def test_the_kept_preflight_is_json(fleet_file):
-    fleet = load_fleet(fleet_file)
-    path = keep(fleet, "x", None, [good("response", delay_s=float("nan"))], [])
+    path = keep(load_fleet(fleet_file), "x", None, [good("response", delay_s=float("nan"))], [])
     assert json.loads(path.read_text())["checks"][0]["figures"] == {}

@@ -18,13 +18,12 @@ import time
 import numpy as np
 import pytest
 from steerclear.env.record import load
-from steerclear.experiments.deploy.demo import Demo
+from steerclear.experiments.deploy.demo import Demo, free_ports
 from steerclear.experiments.deploy.proof import prove
 from steerclear.experiments.sim_boats import AutopilotSettings, SimFleet
 from steerclear.experiments.sim_boats.demo import demo_text
 from steerclear.shield.bridge.blackbox import LogReader
 from steerclear.shield.bridge.fleet_file import load_fleet
-from test_deploy_run import free_ports
 
 logger = logging.getLogger(__name__)
 pytestmark = pytest.mark.study

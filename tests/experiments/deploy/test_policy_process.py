@@ -10,6 +10,7 @@ import time
 
 import numpy as np
 import pytest
+from made_ticks import wait_for
 from steerclear.env.mctf import MctfEnv
 from steerclear.experiments.deploy import policy_process
 from steerclear.experiments.deploy.player import Orders, cast_of, load_player
@@ -18,19 +19,19 @@ from steerclear.shield.exceptions import PolicyError
 
 PATIENCE_S = 180.0
 """A child imports the game, and compiles it when nobody has before."""
+COUNTS = "self.calls = 0"
 
 
 @pytest.fixture
-def run(fleet_of, snapshot_of):
+def run(fleet_of):
     """Starts a policy's process for a fleet of 1 v 1; all are ended when the test is."""
     started = []
 
     def start(policy, deadline_s=1.0, wait=True, **options):
-        process = PolicyProcess(fleet_of(1), policy, deadline_s, **options)
-        started.append(process)
+        started.append(PolicyProcess(fleet_of(1), policy, deadline_s, **options))
         if wait:
-            process.start()
-        return process
+            started[-1].start()
+        return started[-1]
 
     yield start
     for process in started:
@@ -42,9 +43,8 @@ def ask(fleet_of, snapshot_of):
     """Shows snapshots at some rate until a condition on the answer holds; answers it, and how long calls took."""
     env = MctfEnv(cast_of(fleet_of(1)).config)
 
-    def until(process, condition, number=1, limit_s=PATIENCE_S):
-        end_s = time.monotonic() + limit_s
-        spent_s = []
+    def until(process, condition, number=1):
+        end_s, spent_s = time.monotonic() + PATIENCE_S, []
         while time.monotonic() < end_s:
             began_s = time.perf_counter()
             process.offer(snapshot_of(env, fleet_of(1), number, process._clock.now_s()))
@@ -63,75 +63,69 @@ def answered(answer):
     return answer.commands is not None and answer.age_s < 5.0 and not answer.fault
 
 
+def is_running(pid):
+    try:
+        os.kill(pid, 0)
+        with open(f"/proc/{pid}/stat") as file:
+            return file.read().rsplit(")", 1)[1].split()[0] != "Z"
+    except (ProcessLookupError, FileNotFoundError):
+        return False
+
+
+def wait_until(condition):
+    wait_for(condition, PATIENCE_S)
+
+
 def test_a_policy_answers_in_its_process_what_it_answers_here(run, ask, fleet_of, snapshot_of):
-    process = run("medium")
+    process, fleet = run("medium", wait=False), fleet_of(1)
+    answer = process.latest()
+    assert (answer.commands, answer.age_s) == (None, np.inf)
+    assert "loading" in process.latest().fault, "before the first answer it says why there is none"
     answer, _ = ask(process, answered)
-    fleet = fleet_of(1)
-    snapshot = snapshot_of(MctfEnv(cast_of(fleet).config), fleet)
-    here = load_player(Orders(cast_of(fleet), "medium")).play(snapshot)
+    here = load_player(Orders(cast_of(fleet), "medium")).play(snapshot_of(MctfEnv(cast_of(fleet).config), fleet))
     np.testing.assert_array_equal(answer.commands.values, here.commands)
     assert not answer.commands.relative
     assert process.restarts == 0
 
 
-def test_before_the_first_answer_there_is_none_and_it_says_why(run):
-    process = run("medium", wait=False)
-    answer = process.latest()
-    assert answer.commands is None
-    assert answer.age_s == np.inf
-    assert "loading" in process.latest().fault
+def once(mark, after, act):
+    """A submission that does something once, after so many calls."""
+    return f"""
+        import os, sys
+        self.calls += 1
+        if self.calls > {after} and not os.path.exists({str(mark)!r}):
+            open({str(mark)!r}, "w").close()
+            {act}
+        return (1.0, 0.0)
+    """
 
 
 def test_a_policy_that_hangs_is_ended_and_started_again(run, ask, write_entry, tmp_path):
-    mark = tmp_path / "hung"
-    entry = write_entry(
-        f"""
-        import os
-        self.calls += 1
-        if self.calls > 8 and not os.path.exists({str(mark)!r}):
-            open({str(mark)!r}, "w").close()
-            while True:
-                pass
-        return (1.0, 0.0)
-        """,
-        start="self.calls = 0",
-    )
-    process = run(entry, deadline_s=0.6)
+    process = run(write_entry(once(tmp_path / "hung", 8, "while True: pass"), start=COUNTS), deadline_s=0.6)
     ask(process, answered)
     answer, spent_s = ask(process, lambda answer: "has not answered for" in answer.fault)
     assert answer.commands is not None, "the last answer stays, and its age grows"
     answer, more_s = ask(process, lambda answer: "did not answer within 0.6 s" in answer.fault)
     ask(process, answered, number=10**6)
     assert process.restarts == 1
-    spent_s = np.array(spent_s + more_s)
-    assert np.median(spent_s) < 0.02
-    assert spent_s.max() < 1.0, "no call waited for the policy or for its end"
+    assert np.median(spent_s + more_s) < 0.02
+    assert max(spent_s + more_s) < 1.0, "no call waited for the policy or for its end"
 
 
 @pytest.mark.parametrize(
     ("death", "words"),
     [
-        ("print('the end is near'); os._exit(7)", 'ended itself with exit status 7, its last words: "the end is near"'),
+        (
+            "print('the end is near'); sys.stdout.flush(); os._exit(7)",
+            'ended itself with exit status 7, its last words: "the end is near"',
+        ),
         ("os.kill(os.getpid(), 9)", "was ended by SIGKILL"),
         pytest.param("import ctypes; ctypes.string_at(0)", "was ended by SIGSEGV", marks=pytest.mark.study),
         pytest.param("os.closerange(3, 64); return 4", "; starting it again", marks=pytest.mark.study),
     ],
 )
 def test_a_policy_that_dies_is_started_again_and_its_end_is_told(run, ask, write_entry, tmp_path, death, words):
-    mark = tmp_path / "died"
-    entry = write_entry(
-        f"""
-        import os, sys
-        self.calls += 1
-        if self.calls > 4 and not os.path.exists({str(mark)!r}):
-            open({str(mark)!r}, "w").close()
-            sys.stdout.flush()
-            {death.replace("; ", "; sys.stdout.flush(); ", 1) if "print" in death else death}
-        return (1.0, 0.0)
-        """,
-        start="self.calls = 0",
-    )
-    process = run(entry)
+    process = run(write_entry(once(tmp_path / "died", 4, death), start=COUNTS))
     answer, spent_s = ask(process, lambda answer: words in answer.fault)
     assert "starting it again" in answer.fault
     assert max(spent_s) < 1.0
@@ -166,7 +160,7 @@ def test_a_policy_that_floods_and_reads_only_slows_itself(run, ask, write_entry)
     first_s = process._taken_s
     _, more_s = ask(process, lambda answer: answered(answer) and process._taken_s > first_s, number=10**6)
     assert process.restarts == 0
-    assert 0 < len(process.output()) <= 4096
+    assert 0 < len(process._worker.output()) <= 4096
     assert np.median(spent_s + more_s) < 0.02
 
 
@@ -185,47 +179,30 @@ def test_a_policy_that_cannot_be_loaded_is_one_clear_error_at_the_start(run, pol
         run(policy)
 
 
-def test_what_it_started_ends_with_it(run, ask, write_entry, tmp_path):
-    note = tmp_path / "pid"
-    entry = write_entry(
-        "return (1.0, 0.0)",
-        start=f"""
-        import subprocess, sys
-        child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
-        with open({str(note)!r}, "a") as file:
-            file.write(f"{{child.pid}} ")
-        """,
-    )
-    process = run(entry)
-    ask(process, answered)
-    children = [int(pid) for pid in note.read_text().split()]
-    assert all(is_running(pid) for pid in children)
-    process.close()
-    process.close()
-    wait_until(lambda: not any(is_running(pid) for pid in children))
+LEAVES = {
+    "a child": "child = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)'])\nsay(child.pid)",
+    "what left its session": """
+if os.fork() == 0:
+    os.setsid()
+    if os.fork() == 0:
+        say(os.getpid())
+        time.sleep(600)
+    os._exit(0)
+""",
+}
 
 
-def test_what_left_its_session_ends_with_it_too(run, ask, write_entry, tmp_path):
+@pytest.mark.parametrize("kind", LEAVES)
+def test_what_it_started_ends_with_it(run, ask, write_entry, tmp_path, kind):
     note = tmp_path / "pid"
-    entry = write_entry(
-        "return (1.0, 0.0)",
-        start=f"""
-        import os, time
-        if os.fork() == 0:
-            os.setsid()
-            if os.fork() == 0:
-                open({str(note)!r}, "w").write(str(os.getpid()))
-                time.sleep(600)
-            os._exit(0)
-        """,
-    )
-    process = run(entry)
+    say = f"import os, subprocess, sys, time\ndef say(pid):\n    open({str(note)!r}, 'w').write(str(pid))\n"
+    process = run(write_entry("return (1.0, 0.0)", start=say + LEAVES[kind]))
     ask(process, answered)
     wait_until(lambda: note.exists() and note.read_text())  # it writes when it comes to it
-    daemon = int(note.read_text())
-    assert is_running(daemon)
+    assert is_running(int(note.read_text()))
     process.close()
-    wait_until(lambda: not is_running(daemon))
+    process.close()
+    wait_until(lambda: not is_running(int(note.read_text())))
 
 
 def test_a_policy_that_takes_more_than_its_limits_is_ended_by_name(run, ask, write_entry):
@@ -240,15 +217,28 @@ def test_a_policy_that_takes_more_than_its_limits_is_ended_by_name(run, ask, wri
             time.sleep(600)
         return (1.0, 0.0)
         """,
-        start="self.calls = 0",
+        start=COUNTS,
     )
     answer, _ = ask(run(entry, deadline_s=60.0), lambda answer: "was ended: it ran more than 16" in answer.fault)
     assert "starting it again" in answer.fault
 
 
-def test_it_ends_when_the_runner_is_killed(write_entry, tmp_path, fleet_of):
+FLEET = """
+version: 1
+field: {origin: {latitude_deg: 42.0, longitude_deg: -71.0}, size_m: [80, 40]}
+geofence: {xmin_m: -20, ymin_m: -20, xmax_m: 100, ymax_m: 60}
+team: blue
+feed: {listen: "127.0.0.1:14700"}
+boats:
+  - {name: b, agent: agent_0, platform: heron, link: {kind: mavlink, address: "udpin:127.0.0.1:14550", system_id: 1}}
+  - {name: r, agent: agent_1, platform: heron, contact: feed}
+"""
+
+
+def test_it_ends_when_the_runner_is_killed(write_entry, tmp_path):
     """Also while the policy never answers."""
-    note = tmp_path / "pid"
+    note, folder = tmp_path / "pid", tmp_path / "temporary"
+    folder.mkdir()
     entry = write_entry(
         f"""
         import os
@@ -259,29 +249,25 @@ def test_it_ends_when_the_runner_is_killed(write_entry, tmp_path, fleet_of):
             pass
         return 4
         """,
-        start="self.calls = 0",
+        start=COUNTS,
     )
     script = f"""
         import time, numpy as np
         from steerclear.experiments.deploy.policy_process import PolicyProcess
         from steerclear.shield.bridge.fleet_file import parse_fleet
         from steerclear.shield.bridge.messages import Snapshot
-        process = PolicyProcess(parse_fleet({fleet_text()!r}), {entry!r}, 1e6)
+        process = PolicyProcess(parse_fleet({FLEET!r}), {entry!r}, 1e6)
         process.start()
         while True:
             process.offer(Snapshot(0, 0.0, np.zeros((2, 4))))
             time.sleep(0.05)
     """
-    folder = tmp_path / "temporary"
-    folder.mkdir()
-    runner = subprocess.Popen(
-        [sys.executable, "-c", textwrap.dedent(script)], env={**os.environ, "TMPDIR": str(folder)}
-    )
-    try:
-        wait_until(lambda: note.exists() and note.read_text())
-    finally:
-        runner.send_signal(signal.SIGKILL)
-        runner.wait()
+    environment = {**os.environ, "TMPDIR": str(folder)}
+    with subprocess.Popen([sys.executable, "-c", textwrap.dedent(script)], env=environment) as runner:
+        try:
+            wait_until(lambda: note.exists() and note.read_text())
+        finally:
+            runner.send_signal(signal.SIGKILL)
     wait_until(lambda: not is_running(int(note.read_text())))
     assert list(folder.iterdir()) == []
 
@@ -296,75 +282,53 @@ def test_what_a_submission_leaves_in_temporary_files_goes_with_its_process(run, 
     assert list((tmp_path / "temporary").iterdir()) == []
 
 
-def fleet_text():
-    return """
-version: 1
-field: {origin: {latitude_deg: 42.0, longitude_deg: -71.0}, size_m: [80, 40]}
-geofence: {xmin_m: -20, ymin_m: -20, xmax_m: 100, ymax_m: 60}
-team: blue
-feed: {listen: "127.0.0.1:14700"}
-boats:
-  - {name: b, agent: agent_0, platform: heron, link: {kind: mavlink, address: "udpin:127.0.0.1:14550", system_id: 1}}
-  - {name: r, agent: agent_1, platform: heron, contact: feed}
-"""
+class Liar:
+    """A worker that is ready, and answers the first snapshot with something."""
+
+    is_gone, message = True, b""
+
+    def __init__(self, orders):
+        self.said = [b'{"ready": true}']
+
+    def messages(self):
+        said, self.said = self.said, []
+        return said
+
+    def send(self, snapshot):
+        self.said = [self.message]
+
+    def epitaph(self, otherwise):
+        return f"failed: {otherwise}"
+
+    def flush(self, *_):
+        pass
+
+    end = wait = flush
 
 
 @pytest.mark.parametrize(
     "message",
     [b"\xff", b"[]", b"{}", b'{"number": -1}', b'{"number": 1, "commands": [[1, 2]]}', b'{"number": 1, "commands": 3}'],
 )
-def test_an_answer_that_is_none_ends_the_process(fleet_of, message):
-    class Liar:
-        is_gone = True
-
-        def __init__(self, orders):
-            self.said = [b'{"ready": true}']
-
-        def messages(self):
-            said, self.said = self.said, []
-            return said
-
-        def send(self, snapshot):
-            self.said = [message]
-
-        def flush(self):
-            pass
-
-        def epitaph(self, otherwise):
-            return f"failed: {otherwise}"
-
-        def end(self):
-            pass
-
-        def wait(self, timeout_s):
-            pass
-
-    worker, policy_process.Worker = policy_process.Worker, Liar
-    try:
-        with PolicyProcess(fleet_of(1), "medium") as process:
-            process.start()
-            process.offer(snapshot(1))
-            answer = process.latest()
-            assert "failed: " in answer.fault
-            assert answer.commands is None
-            assert process.restarts == 1
-    finally:
-        policy_process.Worker = worker
-
-
-def snapshot(number):
-    return policy_process.Snapshot(number, 0.0, np.zeros((3, 4)))
+def test_an_answer_that_is_none_ends_the_process(fleet_of, monkeypatch, message):
+    monkeypatch.setattr(policy_process, "Worker", type("Told", (Liar,), {"message": message}))
+    with PolicyProcess(fleet_of(1), "medium") as process:
+        process.start()
+        process.offer(policy_process.Snapshot(1, 0.0, np.zeros((3, 4))))
+        answer = process.latest()
+        assert "failed: " in answer.fault
+        assert answer.commands is None
+        assert process.restarts == 1
 
 
 def test_pauses_between_starts_grow_to_a_limit(fleet_of, monkeypatch):
-    now = [0.0]
-    monkeypatch.setattr(policy_process.time, "monotonic", lambda: now[0])
+    now, starts = [0.0], []
 
     def refuse(orders):
         starts.append(now[0])
         raise OSError("no more processes")
 
-    starts = []
+    monkeypatch.setattr(policy_process.time, "monotonic", lambda: now[0])
     monkeypatch.setattr(policy_process, "Worker", refuse)
     process = PolicyProcess(fleet_of(1), "medium")
     while now[0] < 60.0:
@@ -378,17 +342,42 @@ def test_pauses_between_starts_grow_to_a_limit(fleet_of, monkeypatch):
     process.close()
 
 
-def is_running(pid):
-    try:
-        os.kill(pid, 0)
-        with open(f"/proc/{pid}/stat") as file:
-            return file.read().rsplit(")", 1)[1].split()[0] != "Z"
-    except (ProcessLookupError, FileNotFoundError):
-        return False
+TURN_S = 0.05
+POLICIES = {
+    "answers": "return 4",
+    "hangs": "self.n += 1\nwhile self.n > 60: pass\nreturn 4",
+    "dies": "import os\nself.n += 1\nif self.n > 60: os._exit(1)\nreturn 4",
+    "floods": "print('x' * 100_000)\nreturn 4",
+    "not finite": "return (float('nan'), 1e9)",
+}
 
 
-def wait_until(condition):
-    end_s = time.monotonic() + PATIENCE_S
-    while not condition():
-        assert time.monotonic() < end_s
-        time.sleep(0.02)
+@pytest.mark.study
+@pytest.mark.parametrize("kind", POLICIES)
+def test_a_turn_never_waits_for_the_policy(fleet_of, snapshot_of, write_entry, kind):
+    """How long the loop's two calls take; needs a machine that has nothing else to do."""
+    fleet = fleet_of()
+    env = MctfEnv(cast_of(fleet).config)
+    env.reset(seed=1)
+    spent_s, ages_s = [], []
+    with PolicyProcess(fleet, write_entry(POLICIES[kind], start="self.n = 0"), 0.5) as process:
+        process.start()
+        begun_s = due_s = time.monotonic()
+        while due_s - begun_s < 15.0:
+            snapshot = snapshot_of(env, fleet, len(spent_s), time.monotonic())
+            began_s = time.perf_counter()
+            process.offer(snapshot)
+            answer = process.latest()
+            spent_s.append(time.perf_counter() - began_s)
+            ages_s.append(answer.age_s)
+            due_s += TURN_S
+            time.sleep(max(0.0, due_s - time.monotonic()))
+        restarts = process.restarts
+    p50, p99, longest = 1e3 * np.quantile(spent_s, [0.5, 0.99, 1.0])
+    sys.stdout.write(
+        f"\n{kind}: turn {p50:.2f} ms, 99 of 100 within {p99:.1f}, longest {longest:.1f}; age of the answer "
+        f"{np.median(ages_s):.3f} s; started again {restarts} times\n"
+    )
+    assert p99 < 10.0
+    assert longest < 50.0
+    assert (restarts > 0) == (kind in ("hangs", "dies"))

@@ -1,5 +1,6 @@
-"""The referee: the env's rules over boats that nobody but the water moves."""
+"""The referee: the rules of the env over boats that nobody but the water moves, heard by feed or at their own links."""
 
+import contextlib
 import json
 import math
 import os
@@ -7,20 +8,24 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 
 import numpy as np
 import pytest
+from made_ticks import wait_for
 from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
 from steerclear.experiments.cli import app
 from steerclear.experiments.deploy import referee as referee_module
-from steerclear.experiments.deploy.referee import Referee
+from steerclear.experiments.deploy.demo import free_ports
+from steerclear.experiments.deploy.referee import Hearing, Referee
 from steerclear.experiments.deploy.rules import Umpire, game_config, player_names, state_of
 from steerclear.experiments.docs_keys import KEYS, undocumented
+from steerclear.experiments.sim_boats import AutopilotSettings, SimFleet
 from steerclear.shield.bridge.clock import ManualClock, MonotonicClock
 from steerclear.shield.bridge.feed import FeedReceiver, FeedSender, Fix, GameState
-from steerclear.shield.bridge.fleet_file import load_fleet
+from steerclear.shield.bridge.fleet_file import load_fleet, parse_fleet
 from steerclear.shield.bridge.messages import Contact
 from steerclear.shield.exceptions import BridgeError, FleetFileError, GameError
 from steerclear.shield.platforms import layout as L
@@ -28,6 +33,45 @@ from typer.testing import CliRunner
 
 NAMES = ("b1", "b2", "r1", "r2")
 PLACES = {"b1": (25.0, 10.0), "b2": (25.0, 30.0), "r1": (55.0, 10.0), "r2": (55.0, 30.0)}
+FLEET = """
+version: 1
+field: {{origin: {{latitude_deg: 42.0, longitude_deg: -71.0}}, size_m: [80, 40], y_axis_deg: 20.0}}
+geofence: {{xmin_m: -20, ymin_m: -20, xmax_m: 100, ymax_m: 60}}
+team: blue
+rules: {{max_time_s: {seconds}}}
+{feed}
+boats:
+  - {{name: b1, agent: agent_0, platform: heron, {link}}}
+  - {{name: r1, agent: agent_1, platform: heron, {other}}}
+"""
+FEED = 'feed: {{listen: "127.0.0.1:{}", referee: "127.0.0.1:{}"}}'
+UDP = 'link: {{kind: mavlink, address: "udpin:127.0.0.1:{}", system_id: {}}}'
+MOOS = 'link: "moos://127.0.0.1:{}"'
+QUICK = {"autopilot": AutopilotSettings(boot_s=0.0)}
+
+
+def text_of(feed=FEED, link=UDP, seconds=600.0):
+    """A file of one against one, both with links, on free ports."""
+    ports = free_ports(4)
+    links = {"link": link.format(ports[0], 1), "other": link.format(ports[1], 2)}
+    return FLEET.format(feed=feed.format(*ports[2:]), seconds=seconds, **links)
+
+
+@pytest.fixture
+def fleet_file(tmp_path):
+    """Writes the file of a game of two seconds."""
+
+    def build(feed=FEED):
+        path = tmp_path / "FLEET.yaml"
+        path.write_text(text_of(feed, seconds=2.0))
+        return path
+
+    return build
+
+
+@pytest.fixture(autouse=True)
+def _brief_endings(monkeypatch):
+    monkeypatch.setattr(referee_module, "LINGER_S", 0.3)
 
 
 def contacts(now_s, places=PLACES, speed=0.0, heading_deg=0.0, age_s=0.0):
@@ -35,10 +79,14 @@ def contacts(now_s, places=PLACES, speed=0.0, heading_deg=0.0, age_s=0.0):
     return [Contact(boat, place, heading, speed, now_s - age_s, 0.1, "hub") for boat, place in places.items()]
 
 
+def umpire_of(**settings):
+    return Umpire(GameConfig.preset("aamas2024", team_size=2, **settings), NAMES)
+
+
 @pytest.fixture
 def umpire():
     """A game of two against two that has begun at 100 s, boats at `PLACES`."""
-    kept = Umpire(GameConfig.preset("aamas2024", team_size=2), NAMES)
+    kept = umpire_of()
     kept.watch(contacts(100.0), 100.0)
     return kept
 
@@ -53,19 +101,16 @@ def test_the_umpire_of_a_simulated_game_says_what_the_game_says():
     for k, team in enumerate(teams):
         team.reset(env, env.possible_agents[3 * k : 3 * k + 3], 3)
     names = [f"boat {i}" for i in range(6)]
-    umpire = Umpire(config, names)
-    happened = set()
+    umpire, happened = Umpire(config, names), set()
     for step in range(1000):
-        state = env.core.state[0]
         seen = [
             Contact(name, tuple(row[:2].tolist()), math.radians(row[L.HEADING]), row[L.SPEED], step * dt_s, 0.0, "hub")
-            for name, row in zip(names, state, strict=True)
+            for name, row in zip(names, env.core.state[0], strict=True)
         ]
         said = umpire.watch(seen, step * dt_s)
         happened |= {text.split(" ", 2)[2].partition(":")[0] for text in umpire.events if text.startswith("boat")}
         env.core.commands(np.zeros((1, 6, 2)))
-        truth = state_of(env.core, names)
-        assert said == truth, step
+        assert said == state_of(env.core, names), step
         actions = {}
         for team in teams:
             actions |= team.act(observations, infos)
@@ -74,10 +119,9 @@ def test_the_umpire_of_a_simulated_game_says_what_the_game_says():
 
 
 def test_it_waits_for_all_boats_and_says_for_whom():
-    umpire = Umpire(GameConfig.preset("aamas2024", team_size=2), NAMES)
+    umpire = umpire_of()
     state = umpire.watch([], 5.0)
-    assert state.note == "waiting for b1, b2, r1, r2"
-    assert state.time_s == 0.0
+    assert (state.note, state.time_s) == ("waiting for b1, b2, r1, r2", 0.0)
     assert not any(status.tagged or status.driven for status in state.boats.values())
     some = {name: place for name, place in PLACES.items() if name != "r2"}
     assert umpire.watch(contacts(6.0, some), 6.0).note == "waiting for r2"
@@ -91,7 +135,8 @@ def test_it_waits_for_all_boats_and_says_for_whom():
 def test_a_tag_is_told_and_the_tagged_boat_is_driven(umpire):
     raid = {**PLACES, "r1": (33.0, 10.0)}
     umpire.watch(contacts(100.1, raid), 100.1)
-    state = umpire.watch(contacts(100.2, raid), 100.2)
+    state = umpire.watch(contacts(100.2, {**raid, "ferry": (26.0, 11.0)}), 100.2)
+    assert set(state.boats) == set(NAMES), "strangers on the feed change nothing"
     assert "b1 tags r1" in umpire.events
     assert state.boats["r1"].tagged
     assert state.boats["r1"].driven
@@ -99,18 +144,17 @@ def test_a_tag_is_told_and_the_tagged_boat_is_driven(umpire):
     assert state.boats["b1"].cooldown_s == 0.0
 
 
-def test_fixes_are_carried_forward_but_not_far(umpire):
-    umpire.watch(contacts(101.0, PLACES, speed=2.0, heading_deg=90.0, age_s=0.5), 101.0)
-    assert umpire.core.state[0, 0, :2] == pytest.approx((26.0, 10.0))
-    umpire.watch(contacts(102.0, PLACES, speed=2.0, heading_deg=90.0, age_s=4.0), 102.0)
-    assert umpire.core.state[0, 0, :2] == pytest.approx((27.0, 10.0))
+def test_fixes_are_carried_forward_but_not_far_and_time_never_goes_back(umpire):
+    for now_s, age_s, x_m in ((101.0, 0.5, 26.0), (102.0, 4.0, 27.0)):
+        umpire.watch(contacts(now_s, PLACES, speed=2.0, heading_deg=90.0, age_s=age_s), now_s)
+        assert umpire.core.state[0, 0, :2] == pytest.approx((x_m, 10.0))
+    assert umpire.watch(contacts(90.0), 90.0).time_s == pytest.approx(2.0)
 
 
 def test_a_boat_not_heard_of_any_more_is_out_until_it_is_again(umpire):
     known = contacts(100.0)[:1]
     others = {name: place for name, place in PLACES.items() if name != "b1"}
-    state = umpire.watch(known + contacts(104.9, others), 104.9)
-    assert not state.boats["b1"].oob
+    assert not umpire.watch(known + contacts(104.9, others), 104.9).boats["b1"].oob
     state = umpire.watch(known + contacts(105.1, others), 105.1)
     assert state.boats["b1"].oob
     assert state.boats["b1"].tagged
@@ -122,101 +166,42 @@ def test_a_boat_not_heard_of_any_more_is_out_until_it_is_again(umpire):
     assert "b1 is free again" in umpire.events
 
 
-def test_strangers_on_the_feed_change_nothing(umpire):
-    state = umpire.watch(contacts(100.1, {**PLACES, "ferry": (26.0, 11.0)}), 100.1)
-    assert set(state.boats) == set(NAMES)
-
-
 def test_a_game_that_is_over_stands_as_it_ended():
-    umpire = Umpire(GameConfig.preset("aamas2024", team_size=2, max_time_s=2.0), NAMES)
+    umpire = umpire_of(max_time_s=2.0)
     umpire.watch(contacts(0.0), 0.0)
-    state = umpire.watch(contacts(2.5), 2.5)
-    assert state.over
+    assert umpire.watch(contacts(2.5), 2.5).over
     assert umpire.events == ("the game is over",)
     umpire.watch(contacts(3.0), 3.0)
     state = umpire.watch(contacts(3.5, {**PLACES, "r1": (33.0, 10.0)}), 3.5)
-    assert state.tags == (0, 0)
-    assert state.time_s == pytest.approx(2.5)
-    assert umpire.events == ()
+    assert (state.tags, state.time_s, umpire.events) == ((0, 0), pytest.approx(2.5), ())
 
 
-def test_time_never_goes_back(umpire):
-    umpire.watch(contacts(103.0), 103.0)
-    assert umpire.watch(contacts(90.0), 90.0).time_s == pytest.approx(3.0)
+@contextlib.contextmanager
+def hub(fleet, places):
+    """Positions in the field's frame are sent all the time."""
+    frame, axis_deg, done = fleet.frame, fleet.field.y_axis_deg, threading.Event()
+    fixes = [Fix(boat, *frame.to_geodetic_deg(*place), axis_deg, 0.0, 0.0, 0.1) for boat, place in places.items()]
+    with FeedSender("hub", [fleet.feed.referee]) as sender:
 
+        def send():
+            while not done.wait(0.02):
+                sender.send_positions(fixes)
 
-def test_names_must_fit_the_game():
-    with pytest.raises(GameError, match="3 names for 4 boats"):
-        Umpire(GameConfig.preset("aamas2024", team_size=2), NAMES[:3])
-
-
-@pytest.fixture
-def fleet_file(tmp_path, fleet_of):
-    """A FLEET.yaml of one against one whose runner and referee hear at free ports."""
-
-    def build(referee='referee: "127.0.0.1:{port}"'):
-        text = f"""
-version: 1
-field: {{origin: {{latitude_deg: 42.0, longitude_deg: -71.0}}, size_m: [80, 40], y_axis_deg: 20.0}}
-geofence: {{xmin_m: -20, ymin_m: -20, xmax_m: 100, ymax_m: 60}}
-team: blue
-rules: {{max_time_s: 2.0}}
-feed: {{listen: "127.0.0.1:{free_port()}"{", " + referee.format(port=free_port()) if referee else ""}}}
-boats:
-  - {{name: b1, agent: agent_0, platform: heron, link: {{kind: mavlink, address: "udpin:127.0.0.1:1", system_id: 1}}}}
-  - {{name: r1, agent: agent_1, platform: heron, contact: feed}}
-"""
-        path = tmp_path / "FLEET.yaml"
-        path.write_text(text)
-        return path
-
-    return build
-
-
-@pytest.fixture(autouse=True)
-def _brief_endings(monkeypatch):
-    monkeypatch.setattr(referee_module, "LINGER_S", 0.3)
-
-
-def free_port():
-    with FeedReceiver("127.0.0.1:0", None, ManualClock()) as receiver:
-        return receiver.address.rpartition(":")[2]
-
-
-class Hub:
-    """Sends positions in the field's frame at some rate until it is closed."""
-
-    def __init__(self, fleet, places):
-        self._sender = FeedSender("hub", [fleet.feed.referee])
-        self._fixes = [
-            Fix(boat, *fleet.frame.to_geodetic_deg(*place), fleet.field.y_axis_deg, 0.0, 0.0, 0.1)
-            for boat, place in places.items()
-        ]
-        self._closing = threading.Event()
-        self._thread = threading.Thread(target=self._run)
-
-    def _run(self):
-        while not self._closing.wait(0.02):
-            self._sender.send_positions(self._fixes)
-
-    def __enter__(self):
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_):
-        self._closing.set()
-        self._thread.join()
-        self._sender.close()
+        thread = threading.Thread(target=send)
+        thread.start()
+        try:
+            yield
+        finally:
+            done.set()
+            thread.join()
 
 
 def test_runners_hear_how_the_game_stands_over_the_feed(fleet_file):
-    fleet = load_fleet(fleet_file())
-    clock = MonotonicClock()
-    told = []
+    fleet, clock, told = load_fleet(fleet_file()), MonotonicClock(), []
     with (
         FeedReceiver(fleet.feed.listen, fleet.frame, clock, boats=fleet.names) as runner,
         Referee(fleet, clock) as referee,
-        Hub(fleet, {"b1": (33.0, 20.0), "r1": (34.0, 20.0)}),
+        hub(fleet, {"b1": (33.0, 20.0), "r1": (34.0, 20.0)}),
     ):
         why = referee.run(lambda state, events: told.extend(events), lambda: False, rate_hz=20.0, limit_s=60.0)
         last = runner.game()
@@ -229,9 +214,8 @@ def test_runners_hear_how_the_game_stands_over_the_feed(fleet_file):
 
 
 def test_it_stops_when_told_and_when_time_is_up(fleet_file):
-    fleet = load_fleet(fleet_file())
+    fleet, looks = load_fleet(fleet_file()), []
     with Referee(fleet, ManualClock(), publish=["127.0.0.1:9"]) as referee:
-        looks = []
         assert referee.run(lambda state, events: looks.append(state.note), lambda: len(looks) == 3) == "stopped"
         assert looks == ["waiting for b1, r1"] * 3
         assert referee.run(lambda state, events: None, lambda: False, limit_s=2.0) == "time"
@@ -239,7 +223,7 @@ def test_it_stops_when_told_and_when_time_is_up(fleet_file):
 
 def test_without_addresses_or_players_there_is_no_referee(fleet_file, fleet_of):
     with pytest.raises(FleetFileError, match=r"add feed\.referee"):
-        Referee(load_fleet(fleet_file(referee="")), ManualClock())
+        Referee(load_fleet(fleet_file('feed: {{listen: "127.0.0.1:{}"}}')), ManualClock())
     fleet = load_fleet(fleet_file())
     with Referee(fleet, ManualClock()), pytest.raises(BridgeError, match="cannot hear the feed"):
         Referee(fleet, ManualClock())
@@ -248,33 +232,34 @@ def test_without_addresses_or_players_there_is_no_referee(fleet_file, fleet_of):
         Referee(nobody, ManualClock())
     assert player_names(fleet_of(1)) == ("blue_1", "red_1")
     assert game_config(fleet_of(1)).n_boats == 2
+    with pytest.raises(GameError, match="3 names for 4 boats"):
+        Umpire(GameConfig.preset("aamas2024", team_size=2), NAMES[:3])
 
 
 def test_the_command_keeps_a_game(fleet_file, tmp_path):
     path = fleet_file()
-    with Hub(load_fleet(path), {"b1": (33.0, 20.0), "r1": (60.0, 20.0)}):
+    with hub(load_fleet(path), {"b1": (33.0, 20.0), "r1": (60.0, 20.0)}):
         result = CliRunner().invoke(app, ["referee", str(path), "--json", str(tmp_path / "game.json")])
     assert result.exit_code == 0, result.output
     assert "the game begins" in result.output
     content = json.loads((tmp_path / "game.json").read_text())
     assert undocumented(content, KEYS["referee"]) == []
-    assert content["ended"] == "over"
-    assert content["game"]["over"]
+    assert (content["ended"], content["game"]["over"]) == ("over", True)
     assert content["events"][0]["text"] == "the game begins"
 
 
 @pytest.mark.parametrize(
-    ("options", "words"),
+    ("option", "value", "words"),
     [
-        (["--rate", "0"], "--rate is 0"),
-        (["--minutes", "-1"], "--minutes is -1"),
-        (["--listen", "here"], "HOST:PORT"),
-        (["--publish", "there"], "HOST:PORT"),
-        (["--speed", "0"], "clock speed"),
+        ("--rate", "0", "--rate is 0"),
+        ("--minutes", "-1", "--minutes is -1"),
+        ("--listen", "here", "HOST:PORT"),
+        ("--publish", "there", "HOST:PORT"),
+        ("--speed", "0", "clock speed"),
     ],
 )
-def test_bad_options_are_one_line_and_status_2(fleet_file, options, words):
-    result = CliRunner().invoke(app, ["referee", str(fleet_file()), *options])
+def test_bad_options_are_one_line_and_status_2(fleet_file, option, value, words):
+    result = CliRunner().invoke(app, ["referee", str(fleet_file()), option, value])
     assert result.exit_code == 2
     assert words in result.output
     assert len(result.output.strip().splitlines()) == 1
@@ -282,19 +267,72 @@ def test_bad_options_are_one_line_and_status_2(fleet_file, options, words):
 
 def test_an_interrupted_referee_says_so(fleet_file):
     path = fleet_file()
-    process = subprocess.Popen(
-        [sys.executable, "-m", "steerclear.experiments.cli", "referee", str(path)],
-        stderr=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        with Hub(load_fleet(path), {"b1": (33.0, 20.0), "r1": (60.0, 20.0)}):
-            assert "the game begins" in process.stdout.readline()
-            os.kill(process.pid, signal.SIGINT)
-            _, said = process.communicate(timeout=60.0)
-    finally:
-        process.kill()
-        process.communicate()
+    command = [sys.executable, "-m", "steerclear.experiments.cli", "referee", str(path)]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            with hub(load_fleet(path), {"b1": (33.0, 20.0), "r1": (60.0, 20.0)}):
+                assert "the game begins" in process.stdout.readline()
+                os.kill(process.pid, signal.SIGINT)
+                _, said = process.communicate(timeout=60.0)
+        finally:
+            process.kill()
     assert process.returncode == 130
     assert "interrupted" in said
+
+
+def test_links_are_listened_to_and_left_as_they_were():
+    fleet, clock = parse_fleet(text_of()), MonotonicClock()
+    with SimFleet.from_file(fleet, **QUICK, feed_to=(), waits=True) as boats:
+        vehicles = [boat.autopilot.vehicle for boat in boats.boats.values()]
+        before = [(vehicle.mode, vehicle.armed) for vehicle in vehicles]
+        with Hearing(fleet, clock, links=True) as hearing:
+            wait_for(lambda: len(hearing.contacts()) == 2)
+            found = {contact.boat: contact for contact in hearing.contacts()}
+            assert found["b1"].position_m == pytest.approx((25.0, 20.0), abs=0.1)
+            assert found["r1"].position_m == pytest.approx((55.0, 20.0), abs=0.1)
+            now_s = clock.now_s()
+            with FeedSender("hub", [fleet.feed.referee]) as sender:
+                sender.send_positions([Fix("b1", 42.0, -71.0, 0.0, 1.0, 60.0, 0.1)])
+                wait_for(lambda: hearing.feed.read())
+            assert all(contact.fixed_s > now_s - 10.0 for contact in hearing.contacts()), "of two the fresher one"
+        time.sleep(0.2)
+        assert [(vehicle.mode, vehicle.armed) for vehicle in vehicles] == before
+
+
+def test_boats_that_run_moos_are_heard_at_their_links_too():
+    fleet = parse_fleet(text_of(feed="", link=MOOS))
+    with SimFleet.from_file(fleet, **QUICK, feed_to=()) as boats:
+        with Hearing(fleet, MonotonicClock(), links=True) as hearing:
+            wait_for(lambda: {contact.boat for contact in hearing.contacts()} == {"b1", "r1"})
+        assert not boats.boats["b1"].is_commanded
+
+
+def test_it_must_be_told_where_to_hear():
+    fleet = parse_fleet(text_of(feed=""))
+    with pytest.raises(FleetFileError, match="give --listen or --links"):
+        Hearing(fleet, MonotonicClock())
+    with Hearing(fleet, MonotonicClock(), listen="127.0.0.1:0") as hearing:
+        assert hearing.contacts() == ()
+
+
+def test_with_signing_boats_and_referee_sign_what_they_say_and_nobody_else_is_heard(tmp_path):
+    key_file, clock = tmp_path / "feed.key", MonotonicClock()
+    key_file.write_text("12" * 32)
+    key_file.chmod(0o600)
+    fleet = parse_fleet(text_of() + f"\nsigning: {{key_file: {key_file}}}")
+    strange = Fix("r1", 42.0001, -71.0, 0.0, 0.0, 0.0, 0.0)
+    with (
+        FeedReceiver(fleet.feed.listen, fleet.frame, clock, boats=fleet.names, key=bytes.fromhex("12" * 32)) as runner,
+        Referee(fleet, clock) as referee,
+        FeedSender("gps_hub", [fleet.feed.listen, fleet.feed.referee]) as liar,
+        SimFleet.from_file(fleet, **QUICK) as boats,
+    ):
+        wait_for(lambda: liar.send_positions([strange]) or len(referee.hearing.contacts()) == 2)
+        wait_for(lambda: referee.turn() and runner.game() is not None and len(runner.read()) == 2)
+        x_m, y_m = boats.states()["r1"][:2]
+        for told in (runner.read(), referee.hearing.contacts()):
+            found = {contact.boat: contact for contact in told}
+            assert found["r1"].position_m == pytest.approx((x_m, y_m), abs=0.5)
+        wait_for(lambda: liar.send_positions([strange]) or runner.faults().get("unsigned", 0) > 3)
+        assert set(runner.faults()) == {"unsigned"}
+        assert runner.alarms() == ()

@@ -1,9 +1,12 @@
-"""`steerclear replay` from the command line."""
+"""`steerclear replay`: what it proves, and that logs that were tampered with are never called proved."""
 
 import dataclasses
 import json
+import os
 
+import numpy as np
 import pytest
+from forged_logs import read_records, write_records
 from logged_runs import Encounter, header_of, write_log
 from steerclear.env.record import load
 from steerclear.experiments.cli import app
@@ -13,130 +16,266 @@ from steerclear.shield.bridge.blackbox import McapWriter
 from typer.testing import CliRunner
 
 STEPS = 160
+KEY = "11" * 32
+HEADER = header_of(ShieldConfig())
+
+
+def write(path, ticks, header=HEADER, **more):
+    writer = McapWriter(path, header, flush_s=0.0, capacity=STEPS + 10, **more)
+    for tick in ticks:
+        writer.take(tick)
+    writer.close()
+    assert writer.fault == ""
+    return path
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """Logs: sound; with a lie in it; unshielded, so that boats collide; cut off."""
-    folder = tmp_path_factory.mktemp("logs")
-    header = header_of(ShieldConfig())
-    write_log(folder / "sound.mcap", STEPS, header=header)
-    write_log(folder / "lie.mcap", STEPS, header=header, edit=_lie)
-    write_log(folder / "crash.mcap", STEPS, header=header, shielded=False)
-    writer = McapWriter(folder / "steady.mcap", header, flush_s=0.0)
-    for tick in Encounter(header, STEPS):
-        writer.take(tick)
-    writer.close()
-    whole = (folder / "steady.mcap").read_bytes()
-    (folder / "cut.mcap").write_bytes(whole[: int(0.4 * len(whole))])
-    return folder
+def ticks():
+    made = list(Encounter(HEADER, STEPS))
+    assert any(tick.decisions.intervened.any() for tick in made), "otherwise these tests prove nothing"
+    return made
 
 
-def _lie(tick):
-    if tick.number != 30:
-        return tick
-    decisions = dataclasses.replace(tick.decisions, safety_margin_m=tick.decisions.safety_margin_m + 1e-12)
-    return dataclasses.replace(tick, decisions=decisions)
+@pytest.fixture(scope="module")
+def log(tmp_path_factory, ticks):
+    return write(tmp_path_factory.mktemp("logs") / "run.mcap", ticks)
 
 
 def run(*arguments):
-    return CliRunner().invoke(app, ["replay", *map(str, arguments)], terminal_width=200)
+    result = CliRunner().invoke(app, ["replay", *map(str, arguments)], terminal_width=200)
+    return result.exit_code, " ".join(result.output.split())
 
 
-def test_a_sound_log_is_proved(folder):
-    result = run(folder / "sound.mcap")
-    assert result.exit_code == 0
-    assert "160 of 160 decisions made again, the same bit for bit." in result.output
-    assert "2026-09-21" in result.output
-    assert "own boats blue_1, blue_2" in " ".join(result.output.split())
-    assert "slow" in result.output
+def lied(tick, by_m=1.0):
+    decisions = dataclasses.replace(tick.decisions, safety_margin_m=tick.decisions.safety_margin_m + by_m)
+    return dataclasses.replace(tick, decisions=decisions)
 
 
-def test_a_log_that_lies_is_found_out(folder):
-    result = run(folder / "lie.mcap")
-    assert result.exit_code == 1
-    assert "159 of 160 decisions are the same, 1 differ" in result.output
-    text = " ".join(result.output.split())
-    assert "First difference: tick 30 at 3.00 s, blue_1, safety_margin_m" in text
+def sent_as(tick, change):
+    return dataclasses.replace(tick, sent={name: dataclasses.replace(s, **change(s)) for name, s in tick.sent.items()})
 
 
-def test_a_cut_log_is_proved_as_far_as_it_goes(folder):
-    result = run(folder / "cut.mcap")
-    assert result.exit_code == 0
-    assert "not closed" in result.output
-    assert "not as it was written" not in result.output
-    assert "the same bit for bit" in result.output
+def bare(ticks, numbers=range(STEPS)):
+    return [dataclasses.replace(tick, decisions=None) if tick.number in numbers else tick for tick in ticks]
 
 
-def test_a_cut_log_is_mended(folder, tmp_path):
-    result = run(folder / "cut.mcap", "--mend", tmp_path / "mended.mcap")
-    assert result.exit_code == 0, result.output
-    again = run(tmp_path / "mended.mcap")
-    assert again.exit_code == 0
-    assert "not closed" not in again.output
-    assert "cut off (crash, power or kill) and mended" in again.output
+WRITTEN_ANEW = {
+    "nothing": (
+        lambda ticks: ticks,
+        (0,),
+        ("160 of 160 decisions made again, the same bit for bit.", "own boats blue_1, blue_2", "2026-09-21", "slow"),
+    ),
+    "a lie in the last bits": (
+        lambda ticks: [lied(tick, 1e-12) if tick.number == 30 else tick for tick in ticks],
+        (1,),
+        ("159 of 160 decisions are the same, 1 differ", "First difference: tick 30 at 3.00 s, blue_1, safety_margin_m"),
+    ),
+    "a tick dropped and every later decision forged": (
+        lambda ticks: [*ticks[:29], *map(lied, ticks[30:])],
+        (3,),
+        (f"{STEPS - 30} differ after missing ticks and are not proved (1 gaps)", "1 turns are missing", "NOT PROVED"),
+    ),
+    "a tick dropped": (lambda ticks: ticks[:29] + ticks[30:], (3,), ("1 turns are missing",)),
+    "the first ticks left out": (lambda ticks: ticks[10:], (3,), ("10 turns are missing",)),
+    "speeds of the links altered, the chain made anew": (
+        lambda ticks: [sent_as(tick, lambda _: {"speed_mps": 0.7}) for tick in ticks],
+        (1,),
+        (
+            f"{2 * STEPS} commands are not what was decided",
+            "First of them: tick 0 at 0.00 s, blue_1, speed: decided 2.0",
+        ),
+    ),
+    "no decisions": (
+        bare,
+        (3,),
+        ("no decision of the shield: nothing is proved", f"{2 * STEPS} were sent without a decision"),
+    ),
+    "decisions left out in between": (lambda ticks: bare(ticks, (60, 61)), (1, 3), ("4 were sent without a decision",)),
+    "a turn that stands twice": (lambda ticks: [*ticks[:20], ticks[19], *ticks[20:]], (3,), ("1 times they go back",)),
+    "commands an autopilot cut": (
+        lambda ticks: [
+            sent_as(tick, lambda one: {"speed_mps": min(one.speed_mps, 0.5), "limit_mps": 0.5}) for tick in ticks
+        ],
+        (0,),
+        ("blue_1: its autopilot's limit of 0.5 m/s cut",),
+    ),
+}
+"""What is done to the ticks before they are written, the exit status, and what is said."""
 
 
-def test_without_the_shield_with_everything_written(folder, tmp_path):
+@pytest.mark.parametrize("name", WRITTEN_ANEW)
+def test_a_log_that_was_written_anew_is_told_for_what_it_is(tmp_path, ticks, name):
+    forge, codes, words = WRITTEN_ANEW[name]
+    code, said = run(write(tmp_path / "x.mcap", forge(ticks)))
+    assert code in codes
+    assert all(word in said for word in words), said
+
+
+def changed_tick(records, change):
+    """The records with one changed: the tick of number 50."""
+    k = next(k for k, record in enumerate(records) if record.topic == "/tick" and record.content["number"] == 50)
+    records[k] = records[k].with_content(**change(records[k].content))
+    return records
+
+
+ALTERED = {
+    "cut and closed again": (
+        lambda records: records[: len(records) // 2],
+        3,
+        ("The log is not as it was written: its end was cut off and the file closed again", "the same bit for bit"),
+    ),
+    "speeds altered": (
+        lambda records: changed_tick(
+            records, lambda tick: {"sent": [{**row, "speed_mps": 0.1} for row in tick["sent"]]}
+        ),
+        1,
+        ("2 commands are not what was decided", "some are not as they were written"),
+    ),
+    "a certificate altered": (
+        lambda records: changed_tick(
+            records, lambda tick: {"boats": [{**tick["boats"][0], "certificate_m": 9.0}, *tick["boats"][1:]]}
+        ),
+        1,
+        ("1 differ", "some are not as they were written"),
+    ),
+    "lines taken out": (
+        lambda records: [record for record in records if record.topic != "/log"],
+        3,
+        ("records are missing",),
+    ),
+}
+"""What is done to the records of a file, the exit status, and what is said."""
+
+
+@pytest.mark.parametrize("name", ALTERED)
+def test_a_file_that_was_altered_is_told_for_what_it_is(tmp_path, log, name):
+    forge, wanted, words = ALTERED[name]
+    forged = write_records(tmp_path / "x.mcap", forge(read_records(log)))
+    code, said = run(forged, "--json", tmp_path / "out.json")
+    assert code == wanted
+    assert all(word in said for word in words), said
+    content = json.loads((tmp_path / "out.json").read_text())
+    assert (content["proved"], content["chain"]["chained"]) == (False, True)
+    assert content["chain"]["broken"] >= len(content["chain"]["breaks"]) >= 1
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda data: data + data, "after its end more bytes follow"),
+        (lambda data: data + b"\0", "after its end more bytes follow"),
+        (lambda data: data[:-1], "from some point on it makes no sense"),
+    ],
+)
+def test_a_file_with_more_or_less_than_was_written_is_not_proved(tmp_path, log, change, words):
+    (tmp_path / "x.mcap").write_bytes(change(log.read_bytes()))
+    code, said = run(tmp_path / "x.mcap")
+    assert code == 3
+    assert words in said
+    assert "NOT PROVED" in said
+
+
+def test_a_log_that_was_killed_is_told_as_such_not_as_forged_and_is_mended(tmp_path, log):
+    whole, path = log.read_bytes(), tmp_path / "x.mcap"
+    for cut in range(len(whole) // 2, len(whole) // 2 + 12):  # within the head of a record, and its body
+        path.write_bytes(whole[:cut])
+        code, said = run(path)
+        assert code == 0, said
+        assert "not closed (crash, power or kill)" in said
+        assert "not as it was written" not in said
+    assert run(path, "--mend", tmp_path / "mended.mcap")[0] == 0
+    code, said = run(tmp_path / "mended.mcap")
+    assert code == 0
+    assert "not closed" not in said
+    assert "cut off (crash, power or kill) and mended" in said
+
+
+def test_a_log_in_which_nothing_was_decided_proves_nothing(tmp_path):
+    class Nobody(Encounter):
+        def fleet(self, number):
+            return dataclasses.replace(super().fleet(number), controlled=np.zeros(4, dtype=bool))
+
+    stopped = list(Nobody(HEADER, 20, edit=lambda tick: sent_as(tick, lambda _: {"speed_mps": 0.0})))
+    code, said = run(write(tmp_path / "x.mcap", stopped))
+    assert code == 3
+    assert "No boat was covered: nothing is proved" in said
+    write_log(tmp_path / "y.mcap", 3, edit=lambda tick: dataclasses.replace(tick, fleet=None, decisions=None))
+    code, said = run(tmp_path / "y.mcap")
+    assert code == 3
+    assert "no decision of the shield: nothing is proved" in said
+    assert run(tmp_path / "y.mcap", "--without-shield")[0] == 2
+
+
+def test_codes_are_checked_with_the_key(tmp_path, ticks):
+    path = write(tmp_path / "run.mcap", ticks, key=bytes.fromhex(KEY))
+    for name, digits in (("boats.key", KEY), ("other.key", "22" * 32)):
+        (tmp_path / name).write_text(digits)
+        (tmp_path / name).chmod(0o600)
+    for options, wanted, words in (
+        ((), 0, "codes were not checked: give --key"),
+        (("--key", tmp_path / "boats.key"), 0, "codes are of this key"),
+        (("--key", tmp_path / "other.key"), 3, "is not of this key"),
+        (("--key", tmp_path / "none.key"), 2, ""),
+    ):
+        code, said = run(path, *options)
+        assert code == wanted
+        assert words in said
+
+
+def test_a_log_of_another_program_says_so_though_all_is_the_same(tmp_path, ticks):
+    header = header_of(ShieldConfig(), versions={"steerclear": "0.9"}, sources="abcdef0123")
+    code, said = run(write(tmp_path / "x.mcap", ticks, header))
+    assert code == 0
+    assert "Made by steerclear 0.9, sources abcdef01. Not all is as here, and this program may decide otherwise" in said
+
+
+def test_without_the_shield_with_everything_written(log, tmp_path):
     files = {name: tmp_path / f"out.{name}" for name in ("html", "npz", "json")}
     options = ["--html", files["html"], "--record", files["npz"], "--json", files["json"]]
-    result = run(folder / "sound.mcap", "--without-shield", *options)
-    assert result.exit_code == 0, result.output
+    code, said = run(log, "--without-shield", *options)
+    assert code == 0, said
     content = json.loads(files["json"].read_text())
     assert undocumented(content, KEYS["replay"]) == []
-    assert content["sides"]["with"]["breaches_opponent"] == content["sides"]["with"]["breaches_teammate"] == 0
-    assert sum(content["sides"]["without"][f"breaches_{kind}"] for kind in ("opponent", "teammate")) > 0
-    assert content["sides"]["without"]["closest_opponent_m"] < 2.5 < content["sides"]["with"]["closest_opponent_m"]
+    shielded, without = (content["sides"][side] for side in ("with", "without"))
+    assert shielded["breaches_opponent"] == shielded["breaches_teammate"] == 0
+    assert without["breaches_opponent"] + without["breaches_teammate"] > 0
+    assert without["closest_opponent_m"] < 2.5 < shielded["closest_opponent_m"]
     assert content["stretches"] > 0
-    assert content["different"] == 0
+    assert content["different"] == content["strayed"] == content["unfounded"] == 0
+    assert content["first_sent"] is None
     assert content["files"] == [str(files["html"]), str(files["npz"])]
-    page = files["html"].read_text()
-    assert "as it was" in page
-    assert "without the shield" in page
+    assert all(words in files["html"].read_text() for words in ("as it was", "without the shield"))
     assert load(files["npz"])["position"].shape == (STEPS, 4, 2)
-    assert "closest teammate" in result.output
+    assert "closest teammate" in said
 
 
-def test_breaches_that_happened_get_verdicts(folder, tmp_path):
-    result = run(folder / "crash.mcap", "--without-shield", "--json", tmp_path / "out.json")
-    assert result.exit_code == 0, result.output
+@pytest.mark.parametrize(("options", "verdict"), [((), "avoidable"), (("--no-judge",), "not_judged")])
+def test_breaches_that_happened_get_verdicts_unless_left_out(tmp_path, options, verdict):
+    write_log(tmp_path / "crash.mcap", STEPS, header=HEADER, shielded=False)
+    code, said = run(tmp_path / "crash.mcap", "--without-shield", *options, "--json", tmp_path / "out.json")
+    assert code == 0, said
     content = json.loads((tmp_path / "out.json").read_text())
     assert undocumented(content, KEYS["replay"]) == []
-    verdicts = [breach["verdict"] for breach in content["sides"]["with"]["breaches"]]
-    assert verdicts
-    assert set(verdicts) == {"avoidable"}
-    assert "Breaches that happened" in result.output
-    assert "avoidable" in result.output
-
-
-def test_verdicts_can_be_left_out(folder, tmp_path):
-    result = run(folder / "crash.mcap", "--without-shield", "--no-judge", "--json", tmp_path / "out.json")
-    content = json.loads((tmp_path / "out.json").read_text())
-    assert result.exit_code == 0
-    assert {breach["verdict"] for breach in content["sides"]["with"]["breaches"]} == {"not_judged"}
+    assert {breach["verdict"] for breach in content["sides"]["with"]["breaches"]} == {verdict}
+    assert "Breaches that happened" in said
+    assert options or verdict in said
 
 
 @pytest.mark.parametrize(
     ("content", "words"),
-    [(None, "cannot open"), (b"not a log", "holds no header of a steerclear log"), (b"", "holds no header")],
+    [
+        (None, "cannot open"),
+        (b"not a log", "holds no header of a steerclear log"),
+        (b"", "holds no header"),
+        ("pipe", "it is no plain file"),
+    ],
 )
-def test_bad_input_is_one_line_and_2(tmp_path, content, words):
+def test_bad_input_is_one_line_and_2_and_a_pipe_is_not_waited_for(tmp_path, content, words):
     path = tmp_path / "x.mcap"
-    if content is not None:
+    if content == "pipe":
+        os.mkfifo(path)
+    elif content is not None:
         path.write_bytes(content)
-    result = run(path)
-    assert result.exit_code == 2
-    assert words in " ".join(result.output.split())
-
-
-def test_a_log_without_a_decision_says_so(tmp_path):
-    write_log(tmp_path / "x.mcap", 3, edit=lambda tick: dataclasses.replace(tick, fleet=None, decisions=None))
-    result = run(tmp_path / "x.mcap")
-    assert result.exit_code == 3
-    assert "no decision of the shield: nothing is proved" in result.output
-    assert run(tmp_path / "x.mcap", "--without-shield").exit_code == 2
-
-
-def test_the_tests_encounter_is_one(folder):
-    """Otherwise these tests prove nothing."""
-    assert any(tick.decisions.intervened.any() for tick in Encounter(header_of(ShieldConfig()), STEPS))
+    code, said = run(path)
+    assert code == 2
+    assert words in said

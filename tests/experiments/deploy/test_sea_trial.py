@@ -12,6 +12,7 @@ from steerclear.experiments.deploy.sea_trial import MANOEUVRES, SeaTrial, longes
 from steerclear.experiments.fit.runs import NEEDED, Streams, untold
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.bridge.messages import Snapshot
+from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.platforms import fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L
 
@@ -91,3 +92,14 @@ def test_commands_the_shield_changed_are_counted():
         fleet = types.SimpleNamespace(names=("one", "two"))
         trial.take(types.SimpleNamespace(decisions=types.SimpleNamespace(intervened=[changed, False]), fleet=fleet))
     assert trial.changed == {"one": [2, 3]}
+
+
+@pytest.mark.parametrize("before", ["", "SIGINT"])
+def test_a_trial_that_is_done_ends_the_run_unless_somebody_did(before):
+    operator = Operator()
+    if before:
+        operator.end(before)
+    trial = SeaTrial(parse_fleet(TEXT.replace("PLATFORM", "heron")), (), operator=operator)
+    trial.take(types.SimpleNamespace(decisions=None, fleet=None))
+    assert trial.done
+    assert operator.ended == (before or "the trial is done")

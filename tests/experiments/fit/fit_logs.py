@@ -12,13 +12,15 @@ ORIGIN = (42.0, -71.0)
 EARTH_M = 6378137.0
 
 
-def drive(seconds=36.0, delay_steps=2):
-    """Rows (time, x, y, heading, speed, told speed, told heading) of a rover: turns both ways, a stop, a start."""
-    params, row = get_platform("ardurover_boat").pack(), fresh_state(0.0, 0.0, 0.0, 2.0)
-    told = [(2.0, 0.0), (2.0, 90.0), (1.0, 20.0), (2.5, -60.0), (0.0, -60.0), (2.0, 30.0)]
-    rows, commands = [], [told[0]] * delay_steps
+LEGS = [(2.0, 0.0), (2.0, 90.0), (1.0, 20.0), (2.5, -60.0), (0.0, -60.0), (2.0, 30.0)]
+
+
+def drive(seconds=36.0, legs=LEGS, delay_steps=2, begin_mps=2.0):
+    """Rows (time, x, y, heading, speed, told speed, told heading) of a rover: legs of 6 s, obeyed so much later."""
+    params, row = get_platform("ardurover_boat").pack(), fresh_state(0.0, 0.0, 0.0, begin_mps)
+    rows, commands = [], [legs[0]] * delay_steps
     for k in range(round(seconds / 0.1)):
-        now = told[min(len(told) - 1, int(k * 0.1 / 6.0))]
+        now = legs[int(k * 0.1 / 6.0) % len(legs)]
         rows.append((0.1 * k, row[L.X], row[L.Y], row[L.HEADING], row[L.SPEED], *now))
         commands.append(now)
         speed, heading = commands.pop(0)

@@ -4,29 +4,20 @@ import math
 import re
 import struct
 
+import fit_logs
 import numpy as np
 import pytest
 from fit_logs import FORMATS, WRITERS, as_alog, as_csv, degrees_of, messages_of
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from steerclear.experiments.fit.reading import read_logs
 from steerclear.experiments.fit.runs import FitError
-from steerclear.shield.platforms import fresh_state, get_platform, step_boat
-from steerclear.shield.platforms import layout as L
 
 LEGS = [(2.0, 0.0), (2.0, 90.0), (0.0, 90.0), (2.0, 20.0), (1.0, 20.0), (2.0, -60.0), (0.0, -60.0), (2.0, 30.0)]
 
 
-def drive(seconds=100.0, legs=LEGS):
+def drive(legs=LEGS):
     """Rows (time, x, y, heading, speed, told speed, told heading) of a boat that obeys 0.3 s late, from rest."""
-    params, row = get_platform("ardurover_boat").pack(), fresh_state(0.0, 0.0, 0.0, 0.0)
-    rows, commands = [], [legs[0]] * 3
-    for k in range(round(seconds / 0.1)):
-        now = legs[int(k * 0.1 / 6.0) % len(legs)]
-        rows.append((0.1 * k, row[L.X], row[L.Y], row[L.HEADING], row[L.SPEED], *now))
-        commands.append(now)
-        speed, heading = commands.pop(0)
-        step_boat(params, row, speed, math.remainder(heading - row[L.HEADING], 360.0), 0.1)
-    return np.array(rows)
+    return fit_logs.drive(100.0, legs, delay_steps=3, begin_mps=0.0)
 
 
 def as_tlog(path, rows, every=1, top=lambda t: 3.0, before_fix=0, component=None):
@@ -62,15 +53,6 @@ def read(path, rows, write, **more):
     said = []
     write(path, rows, **more)
     return read_logs([path], tell=said.append), said
-
-
-def told_at(runs, row):
-    """What a log says was commanded at a row's time, of the run that holds it."""
-    for run in runs:
-        k = round((row[0] - run.begin_s % 1.7e9) / 0.1)
-        if 0 <= k < len(run.told):
-            return run.told[k]
-    return None
 
 
 def test_positions_before_a_fix_are_left_out(tmp_path):
@@ -134,10 +116,15 @@ def test_where_the_first_parameter_is_zero_the_cruise_speed_counts(tmp_path):
 def test_commands_keep_their_own_times_whatever_the_rate_of_positions(every, tmp_path):
     rows = drive()
     runs, _ = read(tmp_path / "a.tlog", rows, as_tlog, every=every)
-    changes = [k for k in range(20, len(rows) - 20) if tuple(rows[k, 5:]) != tuple(rows[k - 1, 5:])]
-    for k in changes:
-        before, after = told_at(runs, rows[k - 1]), told_at(runs, rows[k])
-        if before is not None and after is not None:
+    held = {run.begin_s % 1.7e9: run.told for run in runs}
+
+    def told_at(row):
+        found = [told[k] for s, told in held.items() if 0 <= (k := round((row[0] - s) / 0.1)) < len(told)]
+        return found[0] if found else None
+
+    for k in range(20, len(rows) - 20):
+        before, after = told_at(rows[k - 1]), told_at(rows[k])
+        if tuple(rows[k, 5:]) != tuple(rows[k - 1, 5:]) and before is not None and after is not None:
             assert before[0] == pytest.approx(rows[k - 1, 5], abs=1e-3)
             assert after[0] == pytest.approx(rows[k, 5], abs=1e-3)
             assert abs(math.remainder(after[1] - rows[k, 6], 360.0)) < 0.01

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from steerclear.experiments.deploy.demo import free_ports
-from steerclear.experiments.deploy.orders import _delay_s
+from steerclear.experiments.deploy.orders import with_delay
 from steerclear.experiments.sim_boats import AutopilotSettings, SimFleet
 from steerclear.shield import Commands, Shield
 from steerclear.shield.bridge.clock import ManualClock
@@ -136,8 +136,7 @@ def _fleet(folder, told):
     for k, name in enumerate(THEIRS):
         text += THEIRS_LINE.format(name=name, k=k + len(OURS))
     (folder / "FLEET.yaml").write_text(text)
-    fleet = load_fleet(folder / "FLEET.yaml")
-    return fleet if "delay_s" in fleet.shield else fleet.with_shield(delay_s=_delay_s(fleet, None))
+    return with_delay(load_fleet(folder / "FLEET.yaml"))
 
 
 def _while_moving(move, do):
