@@ -19,7 +19,7 @@ from steerclear.shield.exceptions import ConfigError
 from .game_metrics import DEFAULT_PENALTY
 from .metrics import RADII_M, breach_column, check, game_goals, game_metrics_of, pairs_of
 from .play.conditions import CALM, Conditions
-from .play.match import play_job, play_match
+from .play.match import play_again, play_job
 from .play.spec import ANSWER_S, SIDES, MatchSpec
 from .replay_html import write_replay
 from .report import write_report
@@ -28,7 +28,7 @@ from .runner import RESULTS_FILE, Experiment, Run
 from .statistics import DIFFERENCE, summarise
 from .verdicts import COVERED, OFF, ON, all_breaches, state_of, summarise_verdicts
 from .warming import compile_game, compile_judge, compile_shield
-from .workers import Row, Workers, outcomes
+from .workers import Row, Workers
 
 COVERED_DIFFERENCE = f"{DIFFERENCE}_{COVERED}"
 """What the difference of covered and off is called in results; that of on and off is `DIFFERENCE`."""
@@ -83,7 +83,7 @@ class AblationSettings:
 
     @property
     def separation_m(self) -> float:
-        """Radius the shield keeps, m: the one at which its goals are judged."""
+        """Radius the shield keeps, m, at which its goals are judged."""
         return float(self.shield.get("separation_m", RADII_M[0]))
 
     @property
@@ -136,22 +136,21 @@ def quick(settings: AnySettings, max_time_s: float, games: int) -> AnySettings:
 
 
 def results_of(run: Run, settings: AblationSettings, is_quick: bool = False) -> dict[str, Any]:
-    """Put together the content of results.json; `docs_keys` describes it.
-
-    Args:
-        run: what was played; fewer games than the settings ask for when it was interrupted.
-        settings: of the run.
-        is_quick: whether it is the small version.
-    """
+    """Put together the content of results.json, which `docs_keys.KEYS` describes, of what was played."""
     rows = with_states(run.rows, settings.covered)
     first = settings.off_and_on(run.table)
     goals = [] if pairs_of(first).empty else check(game_goals(settings.separation_m), first)
     named = ("pairing", "game", "shielded", "state", "error", "fault")
-    failed = with_states([{**_names(MatchSpec.of_job(job)), **job} for job in run.failed], settings.covered)
+    failed = []
+    for job in run.failed:
+        spec = MatchSpec.of_job(job)
+        about = {"pairing": spec.pairing, "shielded": spec.shield is not None, "covered": spec.covered}
+        failed += with_states([{**job, **about}], settings.covered)
+    pairs = {(row[side], row.get(f"{side}_files")) for row in rows for side in ("own", "opponent")}
     return {
         **run.head(),
         "quick": is_quick,
-        "policy_files": _policy_files(rows),
+        "policy_files": {name: digest for name, digest in sorted(pairs, key=str) if digest},
         "seeds": [settings.seed + game for game in range(settings.games)],
         "games_played": len(rows),
         "games_resumed": run.resumed,
@@ -165,22 +164,13 @@ def results_of(run: Run, settings: AblationSettings, is_quick: bool = False) -> 
     }
 
 
-def _names(spec: MatchSpec) -> dict[str, Any]:
-    return {"pairing": spec.pairing, "game": spec.game, "shielded": spec.shield is not None, "covered": spec.covered}
-
-
 def with_states(rows: Sequence[Row], covered: bool) -> list[dict[str, Any]]:
     """Add to each row the ``state`` of the shield that it counts for: off, on, or covered where that is one."""
     return [{**row, "state": COVERED if covered and row["covered"] else state_of(row)} for row in rows]
 
 
 def pairings_of(table: pd.DataFrame, radii_m: Sequence[float], seed: int = 0) -> list[dict[str, Any]]:
-    """Summarise every pairing.
-
-    Args:
-        table: of games; without a column ``state`` they are off or on.
-        radii_m: at which breaches were counted.
-        seed: of the bootstrap.
+    """Summarise every pairing of a table of games; without a column ``state`` they are off or on.
 
     Returns:
         Of each, JSON-ready: ``pairing``, ``games_off``, ``games_on``, ``metrics`` (per key ``label``, ``off``, ``on``,
@@ -203,49 +193,28 @@ def pairings_of(table: pd.DataFrame, radii_m: Sequence[float], seed: int = 0) ->
     for pairing, games in table.groupby("pairing", sort=False):
         count = {state: int((games["state"] == state).sum()) for state in (OFF, ON, COVERED)}
         lines = figures[figures["pairing"] == pairing]
+        told: dict[str, dict[str, Any]] = {metric.key: {"label": metric.label} for metric in metrics}
+        for line in lines.to_dict("records"):
+            told[line["metric"]][line["state"]] = {name: line[name] for name in ("value", "low", "high", "n")}
+        on = games[games["state"] == ON]
+        reasons = {name.removeprefix("reason_"): int(on[name].sum()) for name in on if name.startswith("reason_")}
         found.append(
             {
                 "pairing": pairing,
                 "games_off": count[OFF],
                 "games_on": count[ON],
                 **({"games_covered": count[COVERED]} if count[COVERED] else {}),
-                "metrics": {m.key: {"label": m.label, **_states(lines, m.key)} for m in metrics},
+                "metrics": told,
                 "verdicts": summarise_verdicts(games.to_dict("records")),
-                "reasons": _reasons(games[games["state"] == ON]),
+                "reasons": {name: n for name, n in reasons.items() if n or name.lower() not in RETIRED},
                 "policy_failures": int(games["policy_failures"].sum()),
             }
         )
     return found
 
 
-def _states(lines: pd.DataFrame, key: str) -> dict[str, Any]:
-    chosen = lines[lines["metric"] == key]
-    return {
-        line["state"]: {name: line[name] for name in ("value", "low", "high", "n")}
-        for line in chosen.to_dict("records")
-    }
-
-
-def _reasons(games: pd.DataFrame) -> dict[str, int]:
-    totals = games[[name for name in games if name.startswith("reason_")]].sum()
-    counts = {name.removeprefix("reason_"): int(count) for name, count in totals.items()}
-    return {name: count for name, count in counts.items() if count or name.lower() not in RETIRED}
-
-
-def _policy_files(rows: Sequence[Row]) -> dict[str, str]:
-    """Digests of the files that were played, by policy; none of named policies."""
-    pairs = {(row[side], row.get(f"{side}_files")) for row in rows for side in ("own", "opponent")}
-    return {name: digest for name, digest in sorted(pairs, key=str) if digest}
-
-
 def write_results(run: Run, results: dict[str, Any], records: Sequence[Any] = ()) -> None:
-    """Write report, replay and results.json into the folder and note the names under ``files``.
-
-    Args:
-        run: the games.
-        results: from `results_of`; gains ``files``.
-        records: games for the replay, unshielded first; none, no replay.
-    """
+    """Write report, replay (of ``records``, unshielded first) and results.json; note the names under ``files``."""
     files = {"results": RESULTS_FILE, "games": table_name()}
     results["files"] = files
     links = []
@@ -263,34 +232,28 @@ def write_results(run: Run, results: dict[str, Any], records: Sequence[Any] = ()
 def replay_of(
     table: pd.DataFrame, specs: Sequence[MatchSpec], separation_m: float, workers: Workers
 ) -> tuple[dict[str, Any], list[Any]] | None:
-    """Play again, for its records, the pair of games with the most breaches when unshielded.
-
-    Returns:
-        The ``replay`` entry of results.json and the records off and on; None without a pair of games.
-    """
+    """Play `most_instructive` again; the ``replay`` entry of results.json and the records, None without a pair."""
     pair = most_instructive(table, separation_m)
     if pair is None:
         return None
     chosen = [spec_of(row, specs) for row in pair]
-    answers = {outcome.job.key: outcome.answer for outcome in outcomes(play_match, chosen, workers)}
-    again = [answers[spec.key] for spec in chosen]
-    if any(result is None for result in again):
+    played = play_again(chosen, workers)
+    if len(played) < len(chosen):
         return None
+    again = [played[spec.key] for spec in chosen]
+    columns = [breach_column(kind, separation_m) for kind in ("teammate", "opponent")]
     entry = {
         "pairing": pair[0]["pairing"],
         "game": pair[0]["game"],
-        "breaches_off": _breaches(pair[0], separation_m),
-        "breaches_on": _breaches(pair[1], separation_m),
+        "breaches_off": sum(int(pair[0][column]) for column in columns),
+        "breaches_on": sum(int(pair[1][column]) for column in columns),
         "same_as_played": all(same_game(row, result.row) for row, result in zip(pair, again, strict=True)),
     }
     return entry, [result.record for result in again]
 
 
 def most_instructive(table: pd.DataFrame, separation_m: float) -> tuple[Row, Row] | None:
-    """Choose the pair of games, off and on, with the most breaches when unshielded; None without a pair.
-
-    Of those with the own team in blue, where there are any.
-    """
+    """The pair of games, off and on, with the most breaches when unshielded, in blue where there are any; or None."""
     pairs = pairs_of(table)
     if pairs.empty:
         return None
@@ -314,17 +277,8 @@ def spec_of(row: Row, specs: Sequence[MatchSpec]) -> MatchSpec:
 
 def same_game(first: Row, second: Row) -> bool:
     """Tell whether two rows are the same game; times of computing may differ."""
-    return all(
-        _same(first.get(name), value) for name, value in second.items() if name not in TIMED and name != "breaches"
-    )
-
-
-def _same(first: Any, second: Any) -> bool:
-    return bool(first == second or (second is None and (first is None or first != first)))
-
-
-def _breaches(row: Row, separation_m: float) -> int:
-    return sum(int(row[breach_column(kind, separation_m)]) for kind in ("teammate", "opponent"))
+    both = ((first.get(name), value) for name, value in second.items() if name not in (*TIMED, "breaches"))
+    return all(bool(one == two or (two is None and (one is None or one != one))) for one, two in both)
 
 
 _SEATS = (("own policy", "", "own: "), ("opponents' policy", "opponent_", "opponent: "))
@@ -337,8 +291,7 @@ def failure_warnings(rows: Sequence[Row]) -> list[str]:
     for words, column, begin in _SEATS:
         failed = [row for row in rows if row[f"{column}policy_failures"]]
         if failed:
-            count = sum(int(row[f"{column}policy_failures"]) for row in failed)
-            text = _first_text(failed, begin)
+            count, text = sum(int(row[f"{column}policy_failures"]) for row in failed), _first_text(failed, begin)
             found.append(
                 f"The {words} failed {count:,} time{'s' if count > 1 else ''}, in {len(failed)} of {len(rows)} games; "
                 "its boats stopped for those steps, so the figures are not those of a working policy."

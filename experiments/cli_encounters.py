@@ -13,7 +13,7 @@ from steerclear.shield.platforms.files import is_path
 
 from . import cli_options as o
 from .baselines.registry import NONE, is_shield, parse_guards
-from .console import command, finish, out, progress, say
+from .console import command, finish, out, say
 from .encounters.attack import MOST_PLAYED, Search, experiment_of, passed, searches_table
 from .encounters.attack import write_all as write_searches
 from .encounters.outcomes import measure_chunk
@@ -26,7 +26,6 @@ from .encounters.simulate import play
 from .play.spec import check_count
 from .replay_html import write_replay
 from .result_files import check_new, make_folder
-from .runner import execute
 from .tables import goals_table, number_text, titled
 
 
@@ -40,11 +39,7 @@ class SceneOptions:
     current: Annotated[float, o.option("M/S", "Speed of a current; the guard is told it, not where to.")] = 0.0
 
     def given(self) -> Conditions:
-        """The conditions.
-
-        Raises:
-            ConfigError: one is out of range.
-        """
+        """The conditions; ConfigError where one is out of range."""
         return Conditions(self.radius, self.delay, self.noise, self.current)
 
 
@@ -86,9 +81,7 @@ def encounters(
         return
     families = family_names(family)
     settings = Settings(platform_pairs(platform), families, guards, n, seed, scenes.given(), not no_judge)
-    workers, experiment = where.workers(), settings.experiment()
-    with progress("chunks of encounters", len(experiment.jobs)) as notice:
-        run = execute(experiment, where.folder_of("encounters"), workers, where.resume, notice)
+    run = where.run(settings.experiment())
     results = results_of(run)
     if results["cells"]:
         write_all(run, settings, results)
@@ -100,11 +93,7 @@ def encounters(
 
 
 def _refuse_beside_scenes(held: dict[str, bool], unused: dict[str, bool]) -> None:
-    """Options of drawn encounters say nothing about scenes: what a scene file holds, and what is for many games.
-
-    Raises:
-        ConfigError: one of them was given.
-    """
+    """Refuse (ConfigError) options that say nothing about scenes: what a file holds, and what is for many games."""
     for given, why in (
         (held, "a scene file holds its own; leave it out, or edit the file"),
         (unused, "scenes are played one after another and leave no results; leave it out"),
@@ -115,11 +104,7 @@ def _refuse_beside_scenes(held: dict[str, bool], unused: dict[str, bool]) -> Non
 
 
 def platform_pairs(text: str) -> tuple[Pair, ...]:
-    """Read ``heron,heron/surveyor`` as pairs of own and other platform.
-
-    Raises:
-        ConfigError: no name, or more than two in a pair.
-    """
+    """Read ``heron,heron/surveyor`` as pairs of own and other platform."""
     pairs = tuple(dict.fromkeys(_pair(piece.strip()) for piece in text.split(",") if piece.strip()))
     if not pairs:
         raise ConfigError("--platform names no platform; write e.g. heron,surveyor")
@@ -143,11 +128,7 @@ def _pair(piece: str) -> Pair:
 
 
 def family_names(text: str) -> tuple[str, ...]:
-    """Read names of families; ``all`` is every one.
-
-    Raises:
-        ConfigError: no name.
-    """
+    """Read names of families; ``all`` is every one."""
     names = tuple(dict.fromkeys(filter(None, (part.strip() for part in text.split(",")))))
     if not names:
         raise ConfigError(f"--family names none; write all, or some of {', '.join(FAMILIES)}")
@@ -171,9 +152,6 @@ def play_scene_files(paths: Sequence[Path], guards: Sequence[str], folder: Path 
 
     Returns:
         Whether no shield had an avoidable breach.
-
-    Raises:
-        SteerclearError: a file that is no scene, a guard that cannot be made, or a folder with another replay.
     """
     replay = None if folder is None else folder / "replay.html"
     check_new(replay, "--out")
@@ -234,13 +212,11 @@ def attack(
     given, sizes = scenes.given(), (what.population, what.generations)
     first = Search(*pairs[0], what.attackers, what.own, guards[0], given, what.seed, 0, *sizes)
     first.duel()
-    workers, folder = where.workers(), where.folder_of("attack")
-    with progress("searches", what.restarts) as notice:
-        run = execute(experiment_of(first, what.restarts), folder, workers, where.resume, notice)
+    run = where.run(experiment_of(first, what.restarts))
     results = write_searches(run)
     if not run.interrupted:
         out().print(searches_table(results))
-        say(*(folder / name for name in results["files"].values()))
+        say(*(run.folder / name for name in results["files"].values()))
         where.copy(results)
     run.end()
     finish(passed(results))

@@ -14,20 +14,20 @@ from steerclear.shield.exceptions import ConfigError
 from . import cli_options as o
 from .ablation import quick as small_version
 from .ablation import spec_of
-from .cli_games import end_run, run_games, say_of_distance
+from .cli_games import end_run, run_games
 from .console import App, command, finish, progress, say, warn
 from .entries.check import always_late, check_entry, headline
 from .entries.report_page import EntryGames, games_to_look_at, shielded_zip, write_entry_page
 from .entries.team import is_entry
 from .entries.wrap import wrap_entry
-from .play.match import play_match
+from .play.match import play_again
 from .play.spec import ANSWER_S
-from .policy_checks import say_of_elsewhere
+from .policy_checks import say_of_distance, say_of_elsewhere
 from .provenance import machine, versions
 from .replay_html import write_replay
 from .result_files import NEW, write_json
 from .runner import Run
-from .workers import Workers, outcomes
+from .workers import Workers
 
 app = App(
     help="A competition entry: check that it plays, report what the shield does, wrap it into a shielded zip.",
@@ -38,11 +38,7 @@ QUICK_GAMES, QUICK_TIME_S = 2, 200.0
 
 
 def check_path(entry: str) -> None:
-    """Refuse what is no path of an entry.
-
-    Raises:
-        ConfigError: it is a policy's name or a model.
-    """
+    """Refuse (ConfigError) what is no path of an entry but a policy's name or a model."""
     if not is_entry(entry) or entry.startswith("sb3:"):
         raise ConfigError(f"{entry} is no entry; give a folder or a zip with solution.py, such as ./{entry}.zip")
 
@@ -65,8 +61,7 @@ def check(
     say_of_elsewhere([entry], GameConfig.preset(preset), warn)
     found = check_entry(entry, preset, max_time, answer_time)
     say(*check_lines(found))
-    if json_file is not None:
-        write_json(json_file, {"command": "entry check", "versions": versions(), "machine": machine(), **found})
+    write_json(json_file, {"command": "entry check", "versions": versions(), "machine": machine(), **found})
     finish(not found["failures"] and not always_late(found))
 
 
@@ -94,9 +89,7 @@ def check_lines(found: dict[str, Any]) -> list[str]:
 
 
 def _kept(shield: dict[str, Any] | None) -> str:
-    return (
-        "no shield in it" if shield is None else f"its shield keeps {shield['separation_m']:g} m, {shield['profile']}"
-    )
+    return f"its shield keeps {shield['separation_m']:g} m, {shield['profile']}" if shield else "no shield in it"
 
 
 def time_text(time_ms: float) -> str:
@@ -169,12 +162,10 @@ def _write_page(settings: EntryGames, run: Run, results: dict[str, Any], looks: 
     for number, (words, off, on) in enumerate(games_to_look_at(rows, settings, looks)):
         chosen = [replace(spec_of(row, specs), judge="none") for row in (off, on)]
         with progress(f"replay {number + 1}", 1):
-            answers = outcomes(play_match, chosen, workers)
-            found = {one.job.key: one.answer.record for one in answers if one.answer is not None}
-        records = [found[spec.key] for spec in chosen if spec.key in found]
-        if len(records) == len(chosen):
+            played = play_again(chosen, workers)
+        if len(played) == len(chosen):
             name, label = f"look_{number + 1}.html", f"{off['pairing']}, game {off['game']}"
-            write_replay(records, folder / name, f"{label}: {words}")
+            write_replay([played[spec.key].record for spec in chosen], folder / name, f"{label}: {words}")
             links.append((f"{words}: {label}", name))
     links.append(("all figures and every game", results["files"]["report"]))
     say(write_entry_page(rows, settings, folder, links, results["warnings"]))
@@ -201,7 +192,6 @@ def wrap(
     if tried["failures"] or always_late(tried):
         stops = "; its shield tells boats to stop that fail" if tried["failures"] else ""
         warn(f"warning: {headline(tried)}{stops}")
-    say_of_distance(settings["separation_m"], game)
+    say_of_distance(settings["separation_m"], game, warn)
     say(f"{made['zip']}: {made['bytes'] / 1e6:.2f} MB; for preset {made['preset']}; {_kept(settings)}")
-    if json_file is not None:
-        write_json(json_file, {"command": "entry wrap", "versions": versions(), "machine": machine(), **made})
+    write_json(json_file, {"command": "entry wrap", "versions": versions(), "machine": machine(), **made})

@@ -14,24 +14,20 @@ from .result_files import NEW, check_new, check_place
 from .runner import BESIDE, EXPERIMENT_FILE, RESULTS_FILE, ROWS_FILE
 
 OTHERS = {
-    ".mcap": "black boxes",
-    ".tlog": "MAVLink logs",
-    ".npz": "records and tables",
-    ".html": "replays and reports",
-    ".yaml": "fleet files",
-    ".yml": "fleet files",
-    ".py": "programs",
-    ".zip": "entries and models",
-    ".png": "pictures",
-    ".svg": "pictures",
-    ".pdf": "pictures",
-    ".mp4": "films",
-    ".gif": "films",
-    ".csv": "tables",
-    ".parquet": "tables",
-    ".jsonl": "games that are kept",
+    "black boxes": (".mcap",),
+    "MAVLink logs": (".tlog",),
+    "records and tables": (".npz",),
+    "replays and reports": (".html",),
+    "fleet files": (".yaml", ".yml"),
+    "programs": (".py",),
+    "entries and models": (".zip",),
+    "pictures": (".png", ".svg", ".pdf"),
+    "films": (".mp4", ".gif"),
+    "tables": (".csv", ".parquet"),
+    "games that are kept": (".jsonl",),
 }
 """Endings of files that are no JSON."""
+OURS = (EXPERIMENT_FILE, ROWS_FILE, RESULTS_FILE, *BESIDE)
 
 
 def check_files(function: Callable[..., Any], given: Mapping[str, Any]) -> None:
@@ -47,17 +43,26 @@ def check_files(function: Callable[..., Any], given: Mapping[str, Any]) -> None:
         ConfigError: one file is named for two things, or is what the command writes into its folder of results, that of
             ``--json`` cannot be written, or one to write is there.
     """
-    spelled = {name: _spelling(name, hint) for name, hint in hints_of(function).items()}
+    hints = hints_of(function)
+    spelled = {name: _spelling(name, hint) for name, hint in hints.items()}
     check_apart({spelled.get(name, name): value for name, value in given.items()})
     check_json_file(given.get("json_file"))
-    folders = [given[name] for name in _folders(function) if isinstance(given.get(name), Path)]
+    folders = [
+        given[name].resolve()
+        for name, hint in hints.items()
+        if isinstance(given.get(name), Path)
+        and any(getattr(info, "metavar", "") == "DIR" for info in typing.get_args(hint)[1:])
+    ]
     for name in written_by(function):
-        check_each_once(given.get(name), spelled[name])
-        _check_not_in(given.get(name), spelled[name], folders)
-        value = None if given.get("resume") else given.get(name)
-        for path in value if isinstance(value, list) else (value,):
-            check_new(path, spelled[name])
-            check_place(path, spelled[name])
+        option, value = spelled[name], given.get(name)
+        check_each_once(value, option)
+        for path in _files(value):
+            if path.name in OURS and path.resolve().parent in folders:
+                words = f"is what the command writes into {path.parent} itself; leave it out, or name another"
+                raise ConfigError(f"{option} {path} {words}")
+        for path in () if given.get("resume") else value if isinstance(value, list) else (value,):
+            check_new(path, option)
+            check_place(path, option)
 
 
 def written_by(function: Callable[..., Any]) -> list[str]:
@@ -66,11 +71,7 @@ def written_by(function: Callable[..., Any]) -> list[str]:
 
 
 def check_apart(given: Mapping[str, Any]) -> None:
-    """Refuse a file that is named by two arguments: writing one would destroy the other.
-
-    Raises:
-        ConfigError: there is one.
-    """
+    """Refuse (ConfigError) a file that is named by two arguments: writing one would destroy the other."""
     seen: dict[Path, str] = {}
     for name, value in given.items():
         for path in _files(value):
@@ -80,11 +81,7 @@ def check_apart(given: Mapping[str, Any]) -> None:
 
 
 def check_each_once(paths: Any, option: str) -> None:
-    """Refuse a file that one option names twice: it would be written twice, or read as if it were two.
-
-    Raises:
-        ConfigError: there is one.
-    """
+    """Refuse (ConfigError) a file that one option names twice: it would be written twice, or read as if it were two."""
     seen: set[Path] = set()
     for path in _files(paths):
         if path.resolve() in seen:
@@ -92,28 +89,13 @@ def check_each_once(paths: Any, option: str) -> None:
         seen.add(path.resolve())
 
 
-def _check_not_in(paths: Any, option: str, folders: list[Path]) -> None:
-    """Refuse a file that the command itself writes into its folder of results."""
-    for path in _files(paths):
-        ours = path.name in (EXPERIMENT_FILE, ROWS_FILE, RESULTS_FILE, *BESIDE)
-        for folder in folders:
-            if ours and path.resolve().parent == folder.resolve():
-                raise ConfigError(
-                    f"{option} {path} is what the command writes into {folder} itself; leave it out, or name another"
-                )
-
-
 def check_json_file(path: Path | None) -> None:
-    """Find out that the file of ``--json`` cannot be written.
-
-    Raises:
-        ConfigError: it is a folder, its name is none or another kind's, or the nearest folder that exists takes no
-            files.
-    """
+    """Refuse (ConfigError) a file of ``--json`` that has another kind's ending, is a folder, or cannot be written."""
     if path is None:
         return
-    if kind := OTHERS.get(path.suffix.lower()):
-        raise ConfigError(f"--json {path} has the ending of {kind}; give a name that ends in .json")
+    for kind, endings in OTHERS.items():
+        if path.suffix.lower() in endings:
+            raise ConfigError(f"--json {path} has the ending of {kind}; give a name that ends in .json")
     try:
         if path.is_dir():
             raise ConfigError(f"--json {path} is a folder; name a file in it, such as {path / 'results.json'}")
@@ -123,11 +105,7 @@ def check_json_file(path: Path | None) -> None:
 
 
 def check_ending(path: Path | None, option: str, *endings: str) -> None:
-    """Refuse a name with another ending than the kind of file written there has.
-
-    Raises:
-        ConfigError: it has.
-    """
+    """Refuse (ConfigError) a name with another ending than the kind of file written there has."""
     if path is not None and path.suffix.lower() not in endings:
         raise ConfigError(f"{option} {path} does not end in {' or '.join(endings)}; give a name that does")
 
@@ -150,12 +128,6 @@ def hints_of(function: Callable[..., Any]) -> dict[str, Any]:
         if typing.get_origin(hint) is typing.Union and len(parts) == 1 and hasattr(parts[0], "__metadata__"):
             hints[name] = parts[0]
     return hints
-
-
-def _folders(function: Callable[..., Any]) -> list[str]:
-    """Names of the arguments that are folders of results."""
-    infos = {name: typing.get_args(hint)[1:] for name, hint in hints_of(function).items()}
-    return [name for name, found in infos.items() if any(getattr(info, "metavar", "") == "DIR" for info in found)]
 
 
 def _spelling(name: str, hint: Any) -> str:

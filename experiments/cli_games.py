@@ -6,12 +6,12 @@ import math
 import time
 from dataclasses import asdict, dataclass, replace
 from importlib.util import find_spec
+from itertools import count
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from steerclear import policies
-from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
 from steerclear.policies.entrants.demonstrator import BOAT_KEYS, OPTION_KEYS, Demonstrator
 from steerclear.policies.registry import KEYBOARD
@@ -25,14 +25,14 @@ from .cli_files import check_ending
 from .console import command, finish, out, progress, say, warn
 from .game_metrics import check_penalty
 from .metrics import RADII_M
-from .play.conditions import check_current, words_of, words_of_settings
-from .play.match import Match, MatchResult, play_match
-from .play.spec import MatchSpec, check_shield, words_of_less
-from .policy_checks import check_no_keyboard, made_of, try_policies
+from .play.conditions import words_of, words_of_settings
+from .play.match import Match, play_match
+from .play.spec import MatchSpec, check_shield
+from .policy_checks import check_run, made_of
 from .provenance import head_of
-from .result_files import NEW, write_json, write_table
-from .runner import Run, execute
-from .saving import check_endings, save_record
+from .replay_html import check_endings, save_record
+from .result_files import NEW, make_folder, write_json, write_table
+from .runner import Run
 from .tables import COVERED_WORDS, covered_table, game_table, goals_table, pairing_table, verdict_table
 from .verdicts import check_judge
 
@@ -122,42 +122,32 @@ def play(
     check_penalty(spec.penalty)
     if not 0.0 < look.speed < math.inf:
         raise ConfigError(f"--speed must be a number above 0; got {look.speed:g}")
-    started = time.perf_counter()
+    started, names = time.perf_counter(), (spec.own, spec.opponent)
     check_endings(files)
-    result = _play(spec, look.window or KEYBOARD in (spec.own, spec.opponent), look.speed)
+    check_run(names, spec.config(), spec.shield, warn, spec.conditions, spec.trust, many=False)
+    if KEYBOARD in names:
+        warn(STEERING)
+    if look.window or KEYBOARD in names:
+        result = play_match(spec, _until_closed, "human", look.speed)
+    else:
+        steps = count(1)
+        with progress("playing", round(spec.config().max_time_s / spec.config().decision_s)) as notice:
+
+            def watch(env: MctfEnv) -> bool:
+                if (step := next(steps)) % 50 == 0:
+                    notice(step)
+                return True
+
+            result = play_match(spec, watch)
     row = result.row
     out().print(game_table(row, spec.radii_m))
     if row["first_failure"]:
         say(f"first policy failure: {row['first_failure']}")
     written = [str(save_record(result.record, path)) for path in files]
     say(*written)
-    if json_file is not None:
-        write_json(json_file, {**head_of("play", asdict(spec), started), "game": row, "files": written})
+    write_json(json_file, {**head_of("play", asdict(spec), started), "game": row, "files": written})
     if held := held_games([row]):
         raise PolicyError("; ".join(held))
-
-
-def _play(spec: MatchSpec, window: bool, speed: float) -> MatchResult:
-    config = spec.config()
-    check_current(spec.conditions, config)
-    if spec.shield is not None:
-        say_of_distance(check_shield(spec.shield, config).separation_m, config)
-    try_policies((spec.own, spec.opponent), spec.trust, config, warn)
-    if KEYBOARD in (spec.own, spec.opponent):
-        warn(STEERING)
-    if window:
-        return play_match(spec, _until_closed, "human", speed)
-    steps = 0
-    with progress("playing", round(config.max_time_s / config.decision_s)) as notice:
-
-        def watch(env: MctfEnv) -> bool:
-            nonlocal steps
-            steps += 1
-            if steps % 50 == 0:
-                notice(steps)
-            return True
-
-        return play_match(spec, watch)
 
 
 def _until_closed(env: MctfEnv) -> bool:
@@ -190,43 +180,16 @@ def demonstrate(
     rules = o.RuleOptions(preset, max_time).given()
     shielded: dict[str, Any] | None = {} if shield else None
     spec = MatchSpec(preset, "options", opponent, 0, seed, side, shielded, rules=rules, judge="none")
-    rows, row = demonstration(spec, Demonstrator(say=warn), speed)
-    out().print(game_table(row, spec.radii_m))
-    say(keep(rows, file))
-
-
-def demonstration(
-    spec: MatchSpec, demonstrator: Demonstrator, speed: float = 1.0, mode: str | None = "human"
-) -> tuple[list[dict[str, Any]], dict[str, Any]]:
-    """Play one game; its demonstrations, each with the game's spec and result beside it, and the game's row.
-
-    Args:
-        spec: the game.
-        demonstrator: the person's team.
-        speed: times faster than the game that the window goes at most.
-        mode: "human" opens the window; None where keys come from elsewhere.
-    """
-    match = Match(spec, mode, speed)
+    match, demonstrator = Match(spec, "human", speed), Demonstrator(say=warn)
     try:
         match.seat(spec.own_team, demonstrator)
-        row = match.play(None if mode is None else _until_closed).row
+        row = match.play(_until_closed).row
     finally:
         match.close()
     about = {name: row[name] for name in ("preset", "opponent", "side", "seed", "captures", "captures_against")}
-    return [{**about, **one} for one in demonstrator.rows], row
-
-
-def keep(rows: list[dict[str, Any]], file: Path) -> Path:
-    """Write demonstrations.
-
-    Raises:
-        ConfigError: the file cannot be written.
-    """
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigError(f"cannot write {file} ({error.strerror}); choose another --out") from error
-    return write_table(file.parent, rows, file.stem)
+    out().print(game_table(row, spec.radii_m))
+    make_folder(file.parent)
+    say(write_table(file.parent, [{**about, **one} for one in demonstrator.rows], file.stem))
 
 
 @command()
@@ -288,11 +251,7 @@ def settings_of(
     many: o.GamesOptions,
     **states: Any,
 ) -> AblationSettings:
-    """What options ask for; ``states``: of the shield.
-
-    Raises:
-        ConfigError: one is unusable.
-    """
+    """What options ask for; ``states``: of the shield."""
     settings = AblationSettings(
         preset=game.preset,
         own=own,
@@ -310,58 +269,24 @@ def settings_of(
     return settings if many.games is None else replace(settings, games=many.games)
 
 
-def check_settings(settings: AblationSettings) -> None:
-    """Find every bad name or number before the first game is played.
-
-    Raises:
-        SteerclearError: a policy, preset, platform, game or shield setting is unusable.
-    """
+def run_games(
+    name: str, settings: AblationSettings, where: o.RunOptions, quick: bool = False
+) -> tuple[dict[str, Any], Run]:
+    """Play all games of the settings, write everything: the content of results.json, and the run, to be ended."""
+    workers = where.workers()
     if not 1 <= settings.games <= MOST_GAMES:
         raise ConfigError(f"--games must be at least 1 and at most {MOST_GAMES:,}; got {settings.games:,}")
     check_penalty(settings.penalty)
     check_judge(settings.judge)
-    game = settings.specs()[0].config()
-    kept_m = check_shield(settings.shield, game).separation_m
-    if any(settings.states):
-        say_of_distance(kept_m, game)
-        made = made_of(settings.own)
-        if made is not None and made.shielded:  # games without ours are not games without a shield
-            words = "has a shield in it: off means that one alone, on that one and ours; play the bare entry instead"
-            warn(f"{settings.own} {words}")
-    names = (settings.own, *settings.opponents)
-    check_no_keyboard(names)
-    try_policies(names, settings.trust, game, warn)
-    check_current(settings.conditions, game)
-
-
-def say_of_distance(kept_m: float, game: GameConfig) -> None:
-    """Say, once a command, that its shield keeps less than the distance at which the game counts collisions."""
-    if words := words_of_less(kept_m, game):
-        warn(words)
-
-
-def run_games(
-    name: str, settings: AblationSettings, where: o.RunOptions, quick: bool = False
-) -> tuple[dict[str, Any], Run]:
-    """Play all games of the settings, write everything.
-
-    Args:
-        name: of the command.
-        settings: of the run.
-        where: folder and workers.
-        quick: whether this is the small version.
-
-    Returns:
-        The content of results.json, and the run, whose `end` ends the command.
-
-    Raises:
-        SteerclearError: bad input; what was played before stays on disk.
-    """
-    workers = where.workers()
-    check_settings(settings)
-    folder, experiment = where.folder_of(name.replace(" ", "-")), settings.experiment(name)
-    with progress("games", len(experiment.jobs)) as notice:
-        run = execute(experiment, folder, workers, where.resume, notice, warn)
+    game, shielded = settings.specs()[0].config(), any(settings.states)
+    check_shield(settings.shield, game)
+    made = made_of(settings.own) if shielded else None
+    if made is not None and made.shielded:  # games without ours are not games without a shield
+        words = "has a shield in it: off means that one alone, on that one and ours; play the bare entry instead"
+        warn(f"{settings.own} {words}")
+    shield, names = settings.shield if shielded else None, (settings.own, *settings.opponents)
+    check_run(names, game, shield, warn, settings.conditions, settings.trust)
+    run = where.run(settings.experiment(name))
     replay = None
     if not run.interrupted:
         try:
@@ -377,14 +302,7 @@ def run_games(
 
 
 def end_run(results: dict[str, Any], run: Run, where: o.RunOptions, check: bool = False) -> None:
-    """Show the tables, write the JSON a user asked for and choose the exit status.
-
-    Raises:
-        Interrupted: by Ctrl-C; what is finished has been written.
-        ConfigError: some games could not be played.
-        JobFault: for one of them a fault of steerclear is why.
-        PolicyError: a policy gave nothing usable throughout some game.
-    """
+    """Show the tables, write the JSON a user asked for and choose the exit status, which what is raised stands for."""
     if not run.interrupted:
         show(results, run.folder)
         where.copy(results)

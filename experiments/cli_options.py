@@ -16,11 +16,13 @@ from steerclear.shield.config import PROFILES, ShieldConfig
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.renamed import current_settings
 
+from .console import progress, warn
 from .game_metrics import DEFAULT_PENALTY
 from .metrics import RADII_M
 from .play.conditions import Conditions
 from .play.spec import ANSWER_S, counted_m
 from .result_files import NEW, write_json
+from .runner import Experiment, Run, execute
 from .workers import Workers, workers_of
 
 
@@ -70,11 +72,7 @@ class KeptOptions:
     shield_set: ShieldSet = None
 
     def given(self) -> dict[str, Any]:
-        """The settings of the shield that were given.
-
-        Raises:
-            ConfigError: one is given twice, or the separation, at which hits are counted as well, is no distance.
-        """
+        """The settings of the shield that were given, each once; hits are counted at the separation as well."""
         named = {"separation_m": self.separation, "profile": self.profile}
         more = {name: getattr(self, name, None) for name in ("opponent_model", "solver")}
         given = current_settings(_together({**named, **more}, self.shield_set, "--shield-set"), warned=True)
@@ -82,11 +80,7 @@ class KeptOptions:
         return given
 
     def of_game(self, preset: str, rules: dict[str, Any]) -> dict[str, Any]:
-        """The same for a game: where none is given it keeps the distance at which the game counts collisions.
-
-        Raises:
-            ConfigError: also where a rule is unknown or unusable.
-        """
+        """The same for a game: where none is given it keeps the distance at which the game counts collisions."""
         return with_distance(self.given(), preset, rules)
 
 
@@ -110,11 +104,7 @@ class RuleOptions:
     rules: Annotated[list[str] | None, option("KEY=VALUE", "Any setting of the game.", "--set")] = None
 
     def given(self) -> dict[str, Any]:
-        """The settings of the game that were given.
-
-        Raises:
-            ConfigError: one is given twice.
-        """
+        """The settings of the game that were given, each once."""
         return _together({"max_time_s": self.max_time, "platforms": self.platform}, self.rules, "--set")
 
 
@@ -158,11 +148,7 @@ class WaterOptions:
     ] = 0.0
 
     def given(self) -> Conditions:
-        """The conditions.
-
-        Raises:
-            ConfigError: one is out of range.
-        """
+        """The conditions; ConfigError where one is out of range."""
         return Conditions(self.delay, self.noise, self.current)
 
 
@@ -177,11 +163,7 @@ class GamesOptions:
     judge: Judge = "shielded"
 
     def names(self) -> tuple[str, ...]:
-        """The opponents.
-
-        Raises:
-            ConfigError: none.
-        """
+        """The opponents."""
         return split_names(self.opponents, "--opponents")
 
 
@@ -198,40 +180,29 @@ class RunOptions:
     resume: Resume = False
     json_file: JsonFile = None
 
-    def workers(self) -> Workers:
-        """Where jobs run.
+    def run(self, experiment: Experiment, folder: Path | None = None) -> Run:
+        """Run an experiment into a folder, that of its command unless one is given, and show progress."""
+        folder, workers = folder or self.folder_of(experiment.command.replace(" ", "-")), self.workers()
+        with progress(experiment.unit, len(experiment.jobs)) as notice:
+            return execute(experiment, folder, workers, self.resume, notice, warn)
 
-        Raises:
-            ConfigError: nowhere.
-        """
+    def workers(self) -> Workers:
+        """Where jobs run; ConfigError where they cannot."""
         return workers_of(self.engine, self.address, self.jobs)
 
     def folder_of(self, command: str) -> Path:
-        """The folder of results: the one named, or a new one.
-
-        Raises:
-            ConfigError: a run is to be gone on with, and it is not said which.
-        """
+        """The folder of results: the one named, or a new one; ConfigError where one to go on with is not named."""
         if self.resume and self.folder is None:
             raise ConfigError("--resume needs the --out folder of the run to go on with")
         return self.folder or Path("results") / f"{command}-{datetime.now():%Y%m%d-%H%M%S}"
 
     def copy(self, results: dict[str, Any]) -> None:
-        """Write the JSON that ``--json`` asks for.
-
-        Raises:
-            ConfigError: it cannot be written.
-        """
-        if self.json_file is not None:
-            write_json(self.json_file, results)
+        """Write the JSON that ``--json`` asks for."""
+        write_json(self.json_file, results)
 
 
 def key_values(pairs: list[str] | None, option: str) -> dict[str, Any]:
-    """Read ``KEY=VALUE`` options; a value is inf, JSON or a tuple of numbers where it can be read so, else text.
-
-    Raises:
-        ConfigError: an entry without ``=``, or a key given twice.
-    """
+    """Read ``KEY=VALUE`` options, each key once; a value is inf, JSON or a tuple of numbers, else text."""
     settings: dict[str, Any] = {}
     for pair in pairs or []:
         name, equals, text = pair.partition("=")
@@ -258,11 +229,7 @@ def _value(text: str) -> Any:
 
 
 def with_distance(shield: dict[str, Any], preset: str, rules: dict[str, Any]) -> dict[str, Any]:
-    """Settings of a shield for a game: where none is given it keeps the distance at which the game counts collisions.
-
-    Raises:
-        ConfigError: a rule is unknown or unusable.
-    """
+    """Settings of a shield for a game: unless given it keeps the distance at which the game counts collisions."""
     metres = counted_m(GameConfig.preset(preset, **rules))
     counted = {} if metres <= RADII_M[0] else {"separation_m": metres}
     return {**counted, **shield}
@@ -279,11 +246,7 @@ def _together(named: dict[str, Any], pairs: list[str] | None, option: str) -> di
 
 
 def split_names(text: str, option: str) -> tuple[str, ...]:
-    """Split a list of names at commas, in order, each once.
-
-    Raises:
-        ConfigError: no name at all.
-    """
+    """Split a list of names at commas, in order, each once; ConfigError where there is none."""
     names = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
     if not names:
         raise ConfigError(f"{option} names no policy; give names separated by commas, e.g. easy,medium")

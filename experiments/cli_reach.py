@@ -3,31 +3,21 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from steerclear.shield.exceptions import SteerclearError, TableError
 from steerclear.shield.platforms.registry import get_platform
-from steerclear.shield.tables.files import (
-    SHIPPED,
-    cache_folder,
-    check_parameters,
-    load_table,
-    read_table,
-    save_table,
-)
-from steerclear.shield.tables.make import COARSER, RADII_M, RUNS, Stage, check_radii, coarser, make_table
+from steerclear.shield.tables.files import SHIPPED, cache_folder, check_parameters, load_table, read_table, save_table
+from steerclear.shield.tables.make import COARSER, RADII_M, RUNS, check_radii, coarser, make_table
 from steerclear.shield.tables.settings import problem_of, read_other_may
 from steerclear.shield.tables.solve import Notice
 
 from . import cli_options as o
 from .cli_games import met
-from .console import App, Interrupted, PlainProgress, command, err, finish, out, progress, say
+from .console import App, Interrupted, bars, command, finish, out, progress, say
 from .reach.pages import (
     LOOKED_UP,
     PLAYED_HEADS,
@@ -97,48 +87,20 @@ def solve(
     check_new(target, "--out")
     kept = checkpoint or target.with_name(target.name + ".checkpoint")
     try:
-        with _stages() as stage:
+        with bars() as begin:
+
+            def stage(name: str) -> Notice:
+                notice = begin(name)
+                return lambda done, total, residual_m: notice(
+                    done, f"largest change {residual_m:.3f} m" if residual_m else "", total
+                )
+
             table = make_table(problem, radii, threads=jobs, checkpoint=kept, runs=runs, stage=stage)
     except KeyboardInterrupt:
         raise Interrupted(f"interrupted; what was solved is kept in {kept}: the same command goes on") from None
     save_table(table, target)
     show_card(out(), table.card)
     say(f"written to {target}, {target.stat().st_size / 1e6:.2f} MB")
-
-
-@contextmanager
-def _stages() -> Iterator[Stage]:
-    if not err().is_terminal:
-        yield _plain_stage
-        return
-    columns = (TextColumn("{task.description}"), BarColumn(20), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, TextColumn("{task.fields[change]}"), console=err(), transient=True) as bar:
-
-        def stage(name: str) -> Notice:
-            task = bar.add_task(name, total=None, change="")
-
-            def notice(done: int, total: int, residual_m: float) -> None:
-                bar.update(task, completed=done, total=total, change=_change(residual_m))
-
-            return notice
-
-        yield stage
-
-
-def _plain_stage(name: str) -> Notice:
-    """A stage where there is no terminal."""
-    shown: PlainProgress | None = None
-
-    def notice(done: int, total: int, residual_m: float) -> None:
-        nonlocal shown
-        shown = shown or PlainProgress(name, total, err())
-        shown(done, _change(residual_m))
-
-    return notice
-
-
-def _change(residual_m: float) -> str:
-    return f"largest change {residual_m:.3f} m" if residual_m else ""
 
 
 @app.command()
@@ -197,8 +159,7 @@ def compare(
     out().print(goals_table(content["goals"]))
     if content["looked_up"]:
         out().print(" ".join(LOOKED_UP.split()))
-    if json_file is not None:
-        write_json(json_file, content)
+    write_json(json_file, content)
     finish(met(content))
 
 
@@ -234,8 +195,7 @@ def play(
     out().print(goals_table(content["goals"]))
     run.write(content)
     say(folder / RESULTS_FILE)
-    if json_file is not None:
-        write_json(json_file, content)
+    write_json(json_file, content)
     finish(met(content))
 
 

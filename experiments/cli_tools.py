@@ -12,7 +12,6 @@ from typing import Annotated, Any
 
 import typer
 from rich.box import SIMPLE_HEAD
-from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 from steerclear.env.parity import replay_trace
@@ -34,10 +33,9 @@ from .console import App, command, err, finish, out, progress, say
 from .docs import SOURCES, write_pages
 from .fit.report import about_the_boat, promise
 from .provenance import head_of
-from .replay_html import write_replay
+from .replay_html import check_endings, save_record, write_replay
 from .result_files import NEW, check_new, read_json, write_json, write_new
 from .runner import RESULTS_FILE
-from .saving import check_endings, save_record
 from .tables import goals_table, interval_text, short_limit, titled
 from .warming import PARTS
 from .workers import end_failed, outcomes, processes_of
@@ -65,9 +63,8 @@ def compare(
     started = time.perf_counter()
     found = compare_runs(read_run(first), read_run(second))
     _show_comparison(found)
-    if json_file is not None:
-        settings = {"first": str(first), "second": str(second)}
-        write_json(json_file, {**head_of("compare", settings, started), **found})
+    settings = {"first": str(first), "second": str(second)}
+    write_json(json_file, {**head_of("compare", settings, started), **found})
 
 
 def _show_comparison(found: dict[str, Any]) -> None:
@@ -150,9 +147,8 @@ def render(
         raise ConfigError(f"only a replay (.html) takes several games; give one record for {to.suffix}")
     path = write_replay(games, to) if several else save_record(games[0], to, at, speed)
     say(path)
-    if json_file is not None:
-        settings = {"records": [str(record) for record in records], "to": str(to), "at": at, "speed": speed}
-        write_json(json_file, {**head_of("render", settings, started), "files": [str(path)]})
+    settings = {"records": [str(record) for record in records], "to": str(to), "at": at, "speed": speed}
+    write_json(json_file, {**head_of("render", settings, started), "files": [str(path)]})
 
 
 @command(jobs=1)
@@ -172,20 +168,27 @@ def parity(
                 end_failed([outcome.why], f"{outcome.job} could not be replayed", f": {outcome.error}")
             found[outcome.job] = outcome.answer
             notice(len(found))
-    reports = [found[path] for path in traces]
+    reports, limits = [found[path] for path in traces], asdict(Tolerances())
     passed = all(report.passed for report in reports)
-    _show_parity(reports)
-    if json_file is not None:
-        head = head_of("parity", {"traces": [str(path) for path in traces]}, started)
-        rows = [_parity_row(report) for report in reports]
-        write_json(json_file, {**head, "passed": passed, "limits": asdict(Tolerances()), "traces": rows})
+    _show_parity(reports, limits)
+    rows = []
+    for row in (report.to_dict() for report in reports):
+        first = row["mismatches"][:MISMATCHES_SHOWN]
+        rows.append({**row, "mismatches": len(row["mismatches"]), "first_mismatches": first})
+    head = head_of("parity", {"traces": [str(path) for path in traces]}, started)
+    write_json(json_file, {**head, "passed": passed, "limits": limits, "traces": rows})
     finish(passed)
 
 
-def _show_parity(reports: Sequence[ParityReport]) -> None:
-    limits = asdict(Tolerances())
-    out().print(_parity_table(reports))
-    say("")
+def _show_parity(reports: Sequence[ParityReport], limits: dict[str, float]) -> None:
+    rows: list[list[str | Text]] = []
+    for report in reports:
+        deviations = [f"{getattr(report, name):.1e}" for name in DEVIATIONS]
+        verdict = Text("ok", "green") if report.passed else Text("over", "red")
+        rows.append([Path(report.path).stem, str(report.steps), *deviations, str(len(report.mismatches)), verdict])
+    rows.append(["limit", "", *(f"{limits[name]:.0e}" for name in DEVIATIONS), "0", ""])
+    heads = ["trace", "steps", "pos. m", "head. deg", "speed m/s", "obs.", "events", ""]
+    out().print(titled("Largest deviation from the recorded games", heads, rows), "")
     for report in reports:
         stem = Path(report.path).stem
         for name, value in report.over().items():
@@ -195,23 +198,6 @@ def _show_parity(reports: Sequence[ParityReport]) -> None:
     over = sum(not report.passed for report in reports)
     words = f"{over} of {len(reports)} over the limits" if over else "all within the limits"
     out().print(f"{len(reports)} traces, {sum(report.steps for report in reports)} steps: {words}")
-
-
-def _parity_table(reports: Sequence[ParityReport]) -> Group:
-    limits = asdict(Tolerances())
-    rows: list[list[str | Text]] = []
-    for report in reports:
-        deviations = [f"{getattr(report, name):.1e}" for name in DEVIATIONS]
-        verdict = Text("ok", "green") if report.passed else Text("over", "red")
-        rows.append([Path(report.path).stem, str(report.steps), *deviations, str(len(report.mismatches)), verdict])
-    rows.append(["limit", "", *(f"{limits[name]:.0e}" for name in DEVIATIONS), "0", ""])
-    heads = ["trace", "steps", "pos. m", "head. deg", "speed m/s", "obs.", "events", ""]
-    return titled("Largest deviation from the recorded games", heads, rows)
-
-
-def _parity_row(report: ParityReport) -> dict[str, Any]:
-    row = report.to_dict()
-    return {**row, "mismatches": len(report.mismatches), "first_mismatches": row["mismatches"][:MISMATCHES_SHOWN]}
 
 
 @command()
@@ -239,8 +225,7 @@ def bench(
     out().print(goals_table(content["goals"]))
     if quick:
         out().print("This was the small version: its figures are rough. Leave out --quick for real ones.")
-    if json_file is not None:
-        write_json(json_file, content)
+    write_json(json_file, content)
     finish(not check or met(content))
 
 

@@ -10,12 +10,11 @@ from steerclear.shield.exceptions import PolicyError
 
 from . import cli_options as o
 from . import tournament as cup
-from .cli_games import met, say_of_distance
+from .cli_games import met
 from .console import command, finish, out, progress, say, warn
 from .game_metrics import check_penalty
-from .play.conditions import CALM, check_current
 from .play.spec import MatchSpec, check_shield
-from .policy_checks import check_no_keyboard, try_policies
+from .policy_checks import check_run
 from .rankings import SCRIPTED
 from .runner import Run
 from .tables import goals_table, titled
@@ -76,8 +75,10 @@ def tournament(
     )
     check_penalty(settings.penalty)
     settings = cup.quick(settings, QUICK_TIME_S) if who.quick else settings
-    workers = where.workers()
-    _check(settings)
+    workers, config = where.workers(), MatchSpec.of_job(settings.final(settings.teams)[0]).config()
+    check_shield(settings.shield, config)
+    shielded = set(settings.states) - {cup.OFF}
+    check_run(settings.teams, config, settings.shield if shielded else None, warn, trust=settings.trust)
     with progress("games", settings.expected) as notice:
         run = cup.play(settings, where.folder_of("tournament"), workers, where.resume, notice, warn)
     results = _write(run, settings, workers if replays else None)
@@ -89,17 +90,6 @@ def tournament(
         names = ", ".join(results["silent"])
         raise PolicyError(f"{names} gave no usable answer throughout some game; mend it or leave it out")
     finish(not check or met(results))
-
-
-def _check(settings: cup.TournamentSettings) -> None:
-    """Find every bad name or number before the first game is played."""
-    config = MatchSpec.of_job(settings.final(settings.teams)[0]).config()
-    kept_m = check_shield(settings.shield, config).separation_m
-    if set(settings.states) - {cup.OFF}:
-        say_of_distance(kept_m, config)
-    check_no_keyboard(settings.teams)
-    check_current(CALM, config)
-    try_policies(settings.teams, settings.trust, config, warn)
 
 
 def _write(run: Run, settings: cup.TournamentSettings, replaying: Workers | None) -> dict[str, Any]:
@@ -118,9 +108,8 @@ def _write(run: Run, settings: cup.TournamentSettings, replaying: Workers | None
 
 def _show(results: dict[str, Any], folder: Path) -> None:
     say(f"{subtitle(results)}\n", *(f"WARNING: {words}\n" for words in results["warnings"]))
-    for title, heads, rows in all_tables(results):
-        out(WIDE).print(titled(title, heads, rows))
-        say("")
+    for table in all_tables(results):
+        out(WIDE).print(titled(table.title, table.heads, table.rows), "")
     say(*cycle_lines(results))
     if results["goals"]:
         out().print(goals_table(results["goals"]))

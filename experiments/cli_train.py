@@ -11,7 +11,6 @@ from shutil import copyfile
 from typing import Annotated, Any
 
 import typer
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from steerclear.policies.entrants.learned.network import Network
 from steerclear.policies.entrants.learned.sb3_file import read_sb3
 from steerclear.policies.entrants.learned.weights_file import read_weights, write_weights
@@ -20,7 +19,7 @@ from steerclear.shield.extras import install_command
 
 from . import cli_options as o
 from .cli_files import check_ending
-from .console import Interrupted, PlainProgress, command, err, progress, say, warn
+from .console import Interrupted, bars, command, progress, say, warn
 from .result_files import NEW, lock_folder, make_folder
 from .runner import RESULTS_FILE
 from .training.config_file import read_config
@@ -88,16 +87,11 @@ def _run(training: Any, folder: Path) -> None:
             f"nothing was left to do: all {total:,} decisions were made before; more decisions in the config go on "
             "from here"
         )
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(20), TimeElapsedColumn(), TextColumn("left"))
     try:
-        if not err().is_terminal:
-            plain = PlainProgress("decisions", total, err(), at_once=True)
-            plain(training.decisions)
-            training.run(plain)
-            return
-        with Progress(*columns, TimeRemainingColumn(), console=err(), transient=True) as bar:
-            task = bar.add_task("training", total=total, completed=training.decisions)
-            training.run(lambda done, words: bar.update(task, completed=done, description=words, refresh=True))
+        with bars() as begin:
+            notice = begin("decisions", total, at_once=True)
+            notice(training.decisions)
+            training.run(notice)
     except KeyboardInterrupt:
         raise Interrupted(
             f"interrupted after {training.decisions:,} decisions: all up to the last rollout is kept in {folder}; "

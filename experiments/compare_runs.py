@@ -27,16 +27,7 @@ GAME = ("opponent", "seed", "side")
 
 @dataclass(frozen=True)
 class PlayedRun:
-    """Results of a run.
-
-    Attributes:
-        folder: where they are.
-        settings: of the run, as its results keep them.
-        version: of steerclear that played it.
-        code: digests of the code that played its games.
-        shielded: whether its games are those with the shield: where there are any, they are.
-        table: its games, one a line.
-    """
+    """Results of a run: its games (those with the shield, where there are any) and what played them."""
 
     folder: Path
     settings: Mapping[str, Any]
@@ -47,11 +38,7 @@ class PlayedRun:
 
 
 def read_run(folder: Path) -> PlayedRun:
-    """Read a results folder, of this version or of 0.8.0 and before.
-
-    Raises:
-        ConfigError: it holds no results of games, or games of several settings.
-    """
+    """Read a results folder; ConfigError where it holds no results of games, or games of several settings."""
     remedy = "give a results folder of ablate or evaluate"
     if not folder.is_dir():
         raise ConfigError(f"{folder} is no folder; {remedy}")
@@ -82,11 +69,9 @@ def _games(
     keys: dict[tuple[Any, ...], str] = {}
     code = set()
     for name, row, digest in (entry for line in lines for entry in (_old_row if old else _rows)(line)):
-        if row["own"] != settings["own"] or row["opponent"] not in settings["opponents"]:
+        if row["own"] != settings["own"] or row["opponent"] not in settings["opponents"] or row["seed"] not in seeds:
             continue
-        if row["shielded"] is not shielded or row["seed"] not in seeds:
-            continue
-        if settings.get("covered") and row["covered"]:  # beside the state on, which is compared
+        if row["shielded"] is not shielded or (settings.get("covered") and row["covered"]):  # beside the state on
             continue
         game = tuple(row[part] for part in GAME)
         if keys.setdefault(game, name) != name:
@@ -118,15 +103,7 @@ def _old_row(line: str) -> list[tuple[str, Mapping[str, Any], str]]:
 
 
 def compare_runs(first: PlayedRun, second: PlayedRun, seed: int = 0) -> dict[str, Any]:
-    """Set two runs beside one another.
-
-    Args:
-        first: what the other is compared with.
-        second: the other.
-        seed: of the bootstrap.
-
-    Returns:
-        What `docs_keys.COMPARE` describes, but for where and when it was made.
+    """Set a second run beside a first: ``compare`` in `docs_keys.KEYS`, but for where and when it was made.
 
     Raises:
         ConfigError: their games are no pairs: of other rules, or none from the same seed.
@@ -138,12 +115,22 @@ def compare_runs(first: PlayedRun, second: PlayedRun, seed: int = 0) -> dict[str
                 f"{second.settings[name]!r}), so their games are no pairs; play both alike but for what you compare"
             )
     pairs = _paired(first, second)
-    metrics = [m for m in game_metrics_of(_radii_m(first, second)) if m.paired]
+    begin = "breaches_opponent_"  # radii at which both counted
+    counted = ({name for name in run.table if name.startswith(begin)} for run in (first, second))
+    radii_m = sorted(float(name.removeprefix(begin).removesuffix("m")) for name in set.intersection(*counted))
+    metrics = [metric for metric in game_metrics_of(radii_m) if metric.paired]
     order = [name for name in first.settings["opponents"] if (pairs["opponent"] == name).any()]
     lines = summarise(pairs, metrics, ["opponent"], ("run", "first", "second"), ["seed", "side"], seed)
     return {
-        "first": _about(first),
-        "second": _about(second),
+        **{
+            which: {
+                "folder": str(run.folder),
+                "own": run.settings["own"],
+                "shielded": run.shielded,
+                "games": len(run.table),
+            }
+            for which, run in (("first", first), ("second", second))
+        },
         "differs": differs(first, second),
         "pairings": [
             {
@@ -177,10 +164,6 @@ def _paired(first: PlayedRun, second: PlayedRun) -> pd.DataFrame:
     return pd.concat(chosen, ignore_index=True)
 
 
-def _about(run: PlayedRun) -> dict[str, Any]:
-    return {"folder": str(run.folder), "own": run.settings["own"], "shielded": run.shielded, "games": len(run.table)}
-
-
 def differs(first: PlayedRun, second: PlayedRun) -> dict[str, list[Any]]:
     """Settings, and versions of the code, that differ, each with both values; None: not given."""
     before, after = (_flat(run) for run in (first, second))
@@ -197,16 +180,6 @@ def _flat(run: PlayedRun) -> dict[str, Any]:
         found |= {f"shield.{name}": value for name, value in shield.items()}
     files = sorted(set(run.table["own_files"].fillna(""))) if len(run.table) else []
     return {**found, "policy_files": files, "version": run.version, "code": sorted(run.code)}
-
-
-def _radii_m(first: PlayedRun, second: PlayedRun) -> tuple[float, ...]:
-    """Radii at which both counted breaches, m."""
-    begin = "breaches_opponent_"
-    counted = [
-        {float(name.removeprefix(begin).removesuffix("m")) for name in run.table if name.startswith(begin)}
-        for run in (first, second)
-    ]
-    return tuple(sorted(counted[0] & counted[1]))
 
 
 def _figures(lines: pd.DataFrame, metrics: Sequence[Metric]) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What a policy, a boat, a reader or a barrier must be; each check raises with the first thing that is not so.
+"""What a policy, a boat, a reader or a barrier must be; each check raises `NotConforming` where it is not.
 
 Run them over your own in a test: ``check_policy("mine")``, ``check_platform("mine")``, ``check_reader(make_env)``,
 ``check_barrier("mine")``.
@@ -7,7 +7,8 @@ Run them over your own in a test: ``check_policy("mine")``, ``check_platform("mi
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -42,12 +43,7 @@ def _hold(condition: bool, what: str) -> None:
 
 
 def check_policy(name: str, preset: str = "aamas2024", **options: Any) -> None:
-    """A policy plays both sides, gives every boat a usable action, and the same ones again from the same seed.
-
-    Raises:
-        NotConforming: it does not.
-        PolicyError: it cannot be built.
-    """
+    """A policy plays both sides, gives every boat a usable action, and the same ones again from the same seed."""
     for side in (0, 1):
         games = [_actions_of(name, preset, side, options) for _ in range(2)]
         _hold(games[0] == games[1], f"policy {name!r} gives other actions from the same seed; draw from reset's seed")
@@ -72,12 +68,7 @@ def _actions_of(name: str, preset: str, side: int, options: dict[str, Any]) -> l
 
 
 def check_platform(name: str | Platform) -> None:
-    """A boat is known by its name, is written to a file and read again the same, and stays finite and within its speed.
-
-    Raises:
-        NotConforming: it does not.
-        PlatformError: there is no such boat.
-    """
+    """A boat is known by its name, is written to a file and read again the same, stays finite and within its speed."""
     boat = get_platform(name)
     if isinstance(name, str):
         _hold(boat.name == name, f"platform {name!r} calls itself {boat.name!r}")
@@ -95,12 +86,7 @@ def check_platform(name: str | Platform) -> None:
 def check_reader(make_env: Callable[[], Any]) -> None:
     """A reader sees all boats, and lets commands through as they are when nothing filters them.
 
-    Args:
-        make_env: builds the environment; each one, reset with the same seed, is the same game.
-
-    Raises:
-        NotConforming: it does not.
-        ConfigError: nobody reads the environment, or no shield can be built for it.
+    ``make_env`` builds the environment; each one, reset with the same seed, is the same game.
     """
     plain, filtered = make_env(), make_env()
     plain_reader, reader = reader_of(plain), reader_of(filtered)
@@ -136,20 +122,15 @@ def _hold_same(plain: Fleet, filtered: Fleet, n: int) -> None:
 def check_barrier(name: str, area_m: tuple[float, float, float, float] = (-100.0, -100.0, 100.0, 100.0)) -> None:
     """A barrier gives the same margins again, none that is no number, falls as a distance does, and so its slope says.
 
-    Args:
-        name: of the barrier.
-        area_m: (xmin, ymin, xmax, ymax) where it is tried, up to a minute ahead.
-
-    Raises:
-        NotConforming: it does not, or its values are none.
-        ConfigError: there is no such barrier.
+    It is tried in ``area_m`` (xmin, ymin, xmax, ymax), up to a minute ahead.
     """
     barrier, random = get_barrier(name), np.random.default_rng(1)
     values, h, off = _values(barrier), 0.05, list[bool]()
     _hold(len(values) == len(_values(barrier)), f"values of barrier {name!r} are not as many each time; give as many")
     for x, y, ahead in random.uniform((*area_m[:2], 0.0), (*area_m[2:], 60.0), (300, 3)).tolist():
         where = f"at ({x:.1f}, {y:.1f}) m, {ahead:.1f} s ahead"
-        row = [_margin(barrier, x + dx, y + dy, ahead, values, where) for dx, dy in _places_round(h)]
+        places_round = ((0.0, 0.0), (h, 0.0), (-h, 0.0), (0.0, h), (0.0, -h))
+        row = [_margin(barrier, x + dx, y + dy, ahead, values, where) for dx, dy in places_round]
         _hold(row[0] == _margin(barrier, x, y, ahead, values, where), f"barrier {name!r} gives another margin {where}")
         if not all(map(math.isfinite, row)):
             continue
@@ -167,32 +148,29 @@ def check_barrier(name: str, area_m: tuple[float, float, float, float] = (-100.0
     _hold(10 * sum(off) <= len(off), f"the slope of barrier {name!r} is not its margin's; mend it, or leave it out")
 
 
-def _places_round(h: float) -> tuple[tuple[float, float], ...]:
-    return (0.0, 0.0), (h, 0.0), (-h, 0.0), (0.0, h), (0.0, -h)
+@contextmanager
+def _foreign(what: str) -> Iterator[None]:
+    """What foreign code raises, which may be anything, in words."""
+    try:
+        yield
+    except Exception as error:
+        raise NotConforming(f"{what}: {type(error).__name__}: {error}") from error
 
 
 def _values(barrier: Barrier) -> Array:
-    try:
+    with _foreign(f"values of barrier {barrier.name!r} raise"):
         return barrier.now()
-    except Exception as error:  # foreign code may raise anything
-        raise NotConforming(f"values of barrier {barrier.name!r} raise {type(error).__name__}: {error}") from error
 
 
 def _slope(barrier: Barrier, x: float, y: float, ahead_s: float, values: Array, where: str) -> tuple[float, float]:
     assert barrier.slope is not None
-    try:
+    with _foreign(f"the slope of barrier {barrier.name!r} is no pair of numbers {where}"):
         along_x, along_y = (float(part) for part in barrier.slope(x, y, ahead_s, values))
-    except Exception as error:  # foreign code may raise anything
-        raise NotConforming(
-            f"the slope of barrier {barrier.name!r} is no pair of numbers {where}: {type(error).__name__}: {error}"
-        ) from error
     return along_x, along_y
 
 
 def _margin(barrier: Barrier, x: float, y: float, ahead_s: float, values: Array, where: str) -> float:
-    try:
+    with _foreign(f"barrier {barrier.name!r} raises {where}"):
         margin = float(barrier.margin(x, y, ahead_s, values))
-    except Exception as error:  # foreign code may raise anything
-        raise NotConforming(f"barrier {barrier.name!r} raises {where}: {type(error).__name__}: {error}") from error
     _hold(not math.isnan(margin), f"barrier {barrier.name!r} is no number {where}; give +inf far from what is kept")
     return margin

@@ -20,23 +20,22 @@ from steerclear.shield.exceptions import SteerclearError
 from typer.core import TyperCommand, TyperOption
 
 from .cli_files import check_files, hints_of
-from .faults import fault_words, machine_words
 from .runner import Interrupted
 from .terminal import SafeConsole
-from .workers import JobFault, interrupted_by_sigterm
+from .workers import JobFault, fault_words, interrupted_by_sigterm, machine_words
 
 __all__ = [
     "App",
     "ExitCode",
     "Interrupted",
     "PlainProgress",
+    "bars",
     "command",
     "err",
     "finish",
     "out",
     "progress",
     "say",
-    "warn",
 ]
 MAX_WIDTH = 100
 """Tables do not stretch over wider terminals."""
@@ -91,11 +90,7 @@ class OnceCommand(TyperCommand):
     """A command each of whose options counts once, but for those that may be repeated: else the last would win."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse as usual what gives no option twice.
-
-        Raises:
-            UsageError: it does.
-        """
+        """Parse as usual what gives no option twice; UsageError where it does."""
         _, _, given = self.make_parser(ctx).parse_args(args=list(args))
         for option in given:
             if isinstance(option, TyperOption) and not option.multiple and given.count(option) > 1:
@@ -160,23 +155,20 @@ def _options_of(
     function: Callable[..., Any], defaults: dict[str, Any]
 ) -> tuple[list[inspect.Parameter], dict[str, type[Any]]]:
     """Options of a function, and its groups of options by the name of the parameter."""
-    hints = hints_of(function)
-    options, groups = list[inspect.Parameter](), dict[str, type[Any]]()
+    hints, found, groups = hints_of(function), list[tuple[str, Any, Any]](), dict[str, type[Any]]()
     for name, parameter in inspect.signature(function).parameters.items():
-        if dataclasses.is_dataclass(hints[name]):
-            groups[name] = hints[name]
-            fields = typing.get_type_hints(groups[name], include_extras=True)
-            for field in dataclasses.fields(groups[name]):
-                empty = field.default is dataclasses.MISSING
-                default = defaults.get(field.name, inspect.Parameter.empty if empty else field.default)
-                options.append(_option(field.name, default, fields[field.name]))
+        if dataclasses.is_dataclass(hint := hints[name]):
+            groups[name] = hint
+            fields = typing.get_type_hints(hint, include_extras=True)
+            own = {one.name: one.default for one in dataclasses.fields(hint)} | defaults
+            found += [(one.name, own[one.name], fields[one.name]) for one in dataclasses.fields(hint)]
         else:
-            options.append(_option(name, parameter.default, hints[name]))
-    return options, groups
-
-
-def _option(name: str, default: Any, hint: Any) -> inspect.Parameter:
-    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=hint)
+            found.append((name, parameter.default, hint))
+    keyword, empty = inspect.Parameter.KEYWORD_ONLY, inspect.Parameter.empty
+    return [
+        inspect.Parameter(name, keyword, default=empty if default is dataclasses.MISSING else default, annotation=hint)
+        for name, default, hint in found
+    ], groups
 
 
 def unbroken(text: str) -> str:
@@ -204,22 +196,15 @@ def finish(passed: bool) -> None:
 
 
 class PlainProgress:
-    """Progress where there is no terminal to draw a bar on: a plain line now and then, fit for a log.
+    """Progress where there is no terminal to draw a bar on: how much is done and left, at most a line in `EVERY_S`.
 
-    Prints how much is done, and about how long the rest takes, at most one line in `EVERY_S`.
-
-    Args:
-        words: what is done.
-        total: how much there is.
-        console: where lines go.
-        at_once: the first that is told is printed, too, so that a long command is seen to have begun.
-        clock: seconds that never go back.
+    ``at_once``: the first that is told is printed, too, so that a long command is seen to have begun.
     """
 
     def __init__(
         self,
         words: str,
-        total: int,
+        total: int | None,
         console: Console,
         at_once: bool = False,
         clock: Callable[[], float] = time.monotonic,
@@ -229,22 +214,18 @@ class PlainProgress:
         self._next_s = self._began_s + (0.0 if at_once else EVERY_S)
         self._before: int | None = None
 
-    def __call__(self, done: int, words: str = "") -> None:
+    def __call__(self, done: int, words: str = "", total: int | None = None) -> None:
         """Tell that so many are done in all; those told first may be an earlier run's and say nothing of the rate."""
-        now_s = self._clock()
+        now_s, self._total = self._clock(), total or self._total or done
         if self._before is None:
             self._before = done
         if now_s < self._next_s:
             return
-        self._next_s = now_s + EVERY_S
-        parts = [f"{self._words}: {done:,} of {self._total:,}", words, self._left(done, now_s - self._began_s)]
+        self._next_s, made, left = now_s + EVERY_S, done - self._before, ""
+        if made > 0 and done < self._total:
+            left = f"about {time_words((self._total - done) * (now_s - self._began_s) / made)} left"
+        parts = [f"{self._words}: {done:,} of {self._total:,}", words, left]
         self._console.print(", ".join(part for part in parts if part), soft_wrap=True)
-
-    def _left(self, done: int, spent_s: float) -> str:
-        made = done - (self._before or 0)
-        if made <= 0 or done >= self._total:
-            return ""
-        return f"about {time_words((self._total - done) * spent_s / made)} left"
 
 
 def time_words(time_s: float) -> str:
@@ -256,17 +237,34 @@ def time_words(time_s: float) -> str:
 
 
 @contextmanager
-def progress(words: str, total: int) -> Iterator[Callable[..., None]]:
-    """Show progress on stderr; call what it yields with the number of finished jobs, and what else is known.
+def bars() -> Iterator[Callable[..., Callable[..., None]]]:
+    """Show progress on stderr, on a terminal as bars, elsewhere as a plain line now and then.
 
-    On a terminal that is a bar, elsewhere a plain line now and then.
+    What it yields begins one: ``begin(words, total, at_once)`` gives what is told how much is done, what else is known
+    in words, and the total where it is known only now.
     """
     console = err()
     if not console.is_terminal:
-        plain = PlainProgress(words, total, console)
-        yield lambda done, *_: plain(done)
+        yield lambda words, total=None, at_once=False: PlainProgress(words, total, console, at_once)
         return
     columns = (TextColumn("{task.description}", markup=False), BarColumn(20), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, TextColumn("left"), TimeRemainingColumn(), console=console, transient=True) as bar:
-        task = bar.add_task(words, total=total)
-        yield lambda done, *_: bar.update(task, completed=done, refresh=True)
+    left = (TextColumn("left"), TimeRemainingColumn(), TextColumn("{task.fields[more]}", markup=False))
+    with Progress(*columns, *left, console=console, transient=True) as bar:
+
+        def begin(words: str, total: int | None = None, at_once: bool = False) -> Callable[..., None]:
+            task = bar.add_task(words, total=total, more="")
+
+            def notice(done: int, more: str = "", total: int | None = None) -> None:
+                bar.update(task, completed=done, total=total, more=more, refresh=True)
+
+            return notice
+
+        yield begin
+
+
+@contextmanager
+def progress(words: str, total: int) -> Iterator[Callable[..., None]]:
+    """A single one of `bars`: call what it yields with the number of finished jobs."""
+    with bars() as begin:
+        notice = begin(words, total)
+        yield lambda done, *_: notice(done)

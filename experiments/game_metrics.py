@@ -35,14 +35,7 @@ class PairDistances:
 
     @classmethod
     def of(cls, position: ArrayLike) -> PairDistances:
-        """Measure a track.
-
-        Args:
-            position: (T+1, n, 2) m, index 0 is the start.
-
-        Raises:
-            ConfigError: another shape, or a position that is not finite.
-        """
+        """Measure a track (T+1, n, 2) m, index 0 the start; ConfigError of another shape, or where it is not finite."""
         track = np.asarray(position, dtype=np.float64)
         if track.ndim != 3 or track.shape[2] != 2 or track.shape[0] < 1:
             raise ConfigError(f"a track has shape (steps + 1, boats, 2); got {track.shape}")
@@ -62,14 +55,11 @@ class PairDistances:
 
 
 def entries(distances: PairDistances, radius_m: ArrayLike) -> NDArray[np.bool_]:
-    """Mark the steps at which a pair enters the radius.
+    """Mark the steps (T, p), row t for step t + 1, at which a pair enters the radius.
 
     Args:
         distances: T steps, p pairs.
         radius_m: one radius or one per pair; two boats at exactly this distance are inside.
-
-    Returns:
-        (T, p), row t for step t + 1.
 
     Raises:
         ConfigError: a radius that is not positive.
@@ -89,23 +79,10 @@ def count_breaches(distances: PairDistances, radius_m: ArrayLike) -> int:
 
 
 def team_pairs(team: ArrayLike, side: int, kind: str) -> NDArray[np.bool_]:
-    """Choose a team's pairs, in the order of `PairDistances.of`.
-
-    Args:
-        team: (n,) team number of each boat.
-        side: the team in question.
-        kind: "teammate" (both boats its own) or "opponent" (exactly one is).
-
-    Raises:
-        ConfigError: another kind.
-    """
+    """Choose the pairs (of `PairDistances.of`) of a team's boats, "teammate", or of one with another's, "opponent"."""
     own = np.asarray(team, dtype=np.int64) == side
     first, second = np.triu_indices(len(own), k=1)
-    if kind == "teammate":
-        return own[first] & own[second]
-    if kind == "opponent":
-        return own[first] != own[second]
-    raise ConfigError(f"unknown kind of pair {kind!r}; choose teammate or opponent")
+    return own[first] & own[second] if kind == "teammate" else own[first] != own[second]
 
 
 STILL_MPS = 0.2
@@ -148,22 +125,10 @@ def deadlocks(speed_mps: Array, wanted_mps: Array, own: BoolArray, longest: int,
 
 
 def count_deadlocks(speed_mps: Array, wanted_mps: Array, own: BoolArray, dt_s: float) -> int:
-    """Count the deadlocks of one game's own boats.
-
-    Args:
-        speed_mps: (T, n) after each step.
-        wanted_mps: (T, n).
-        own: (n,).
-        dt_s: length of a step, s.
-    """
+    """Count the deadlocks of one game's own boats (n,), from speeds after and wanted in each step (T, n)."""
+    speeds = (np.ascontiguousarray(one[:, None], dtype=np.float64) for one in (speed_mps, wanted_mps))
     found = np.empty(1)
-    deadlocks(
-        np.ascontiguousarray(speed_mps[:, None], dtype=np.float64),
-        np.ascontiguousarray(wanted_mps[:, None], dtype=np.float64),
-        np.ascontiguousarray(own),
-        round(DEADLOCK_S / dt_s),
-        found,
-    )
+    deadlocks(*speeds, np.ascontiguousarray(own), round(DEADLOCK_S / dt_s), found)
     return int(found[0])
 
 
@@ -201,28 +166,14 @@ DEFAULT_PENALTY = 0.25
 
 
 def check_penalty(penalty: float) -> float:
-    """Return the weight of a collision.
-
-    Raises:
-        ConfigError: negative or not a finite number.
-    """
+    """Return the weight of a collision; ConfigError where it is negative or not a finite number."""
     if not 0.0 <= penalty < float("inf"):
         raise ConfigError(f"--penalty must be a number >= 0; got {penalty}; the competition used 0.25 and 0.025")
     return penalty
 
 
 def scores(counts: Mapping[str, Any], penalty: float = DEFAULT_PENALTY) -> dict[str, float]:
-    """Score one team by the competition's two scores.
-
-    Args:
-        counts: `captures`, `grabs`, `tags` of the team, the same with `_against` of the other, `collisions`.
-        penalty: weight of a collision in the primary score.
-
-    Returns:
-        ``net_captures`` = captures - captures_against,
-        ``primary`` = captures - captures_against - penalty * collisions,
-        ``secondary`` = grabs + tags - grabs_against - tags_against.
-    """
+    """Score one team by the competition's two scores, from its counts and those (``_against``) of the other."""
     return {
         "net_captures": counts["captures"] - counts["captures_against"],
         "primary": counts["captures"] - counts["captures_against"] - penalty * counts["collisions"],
@@ -231,15 +182,10 @@ def scores(counts: Mapping[str, Any], penalty: float = DEFAULT_PENALTY) -> dict[
 
 
 def tally(record: Record, side: int, radii_m: Sequence[float] = RADII_M) -> dict[str, Any]:
-    """Count for one team.
-
-    Args:
-        record: a game.
-        side: the team in question, 0 blue or 1 red.
-        radii_m: radii at which to count breaches.
+    """Count for one team, 0 blue or 1 red.
 
     Returns:
-        Flat columns: ``breaches_teammate_2.5m`` and so on, ``closest_*_m`` (None without such a pair),
+        Flat columns: ``breaches_teammate_2.5m`` and so on at each radius, ``closest_*_m`` (None without such a pair),
         ``clean_games`` (none at the smallest radius), ``collisions`` (what the game's score counts), the columns of
         `shield_columns`, ``deadlocks`` and what metrics measure by themselves.
     """
@@ -248,7 +194,10 @@ def tally(record: Record, side: int, radii_m: Sequence[float] = RADII_M) -> dict
     own, dt_s = np.asarray(meta["team"]) == side, float(meta["dt_s"])
     return {
         **_breach_columns(distances, meta, side, radii_m),
-        "collisions": scored_collisions(_when_looked(record, meta), meta, side),
+        # the game looks for collisions after every decision, whose steps of motion are recorded each
+        "collisions": scored_collisions(
+            PairDistances.of(record["position"][:: int(meta.get("decision_steps", 1))]), meta, side
+        ),
         **shield_columns(record, own, dt_s),
         "deadlocks": count_deadlocks(record["speed_mps"][1:], record["wanted"][..., 0], own, dt_s),
         **{one.column: one.measure(record, side) for one in game_metrics_of(radii_m) if one.measure is not None},
@@ -266,11 +215,6 @@ def scored_collisions(distances: PairDistances, meta: Mapping[str, Any], side: i
         pairs = distances.of_pairs(team_pairs(meta["team"], side, kind))
         total += boats_in_it * count_breaches(pairs, own_radius_m[pairs.pairs].sum(axis=1))
     return total
-
-
-def _when_looked(record: Record, meta: Mapping[str, Any]) -> PairDistances:
-    """Distances when the game looks for collisions: after every decision, whose steps of motion are recorded each."""
-    return PairDistances.of(record["position"][:: int(meta.get("decision_steps", 1))])
 
 
 def shield_columns(record: Record, own: NDArray[np.bool_], dt_s: float) -> dict[str, Any]:
@@ -299,13 +243,7 @@ def shield_columns(record: Record, own: NDArray[np.bool_], dt_s: float) -> dict[
 def driven_breaches(
     record: Record, driven: NDArray[np.bool_], side: int, radii_m: Sequence[float] = RADII_M
 ) -> dict[str, int]:
-    """Count the breaches of a team in which the game drove a boat of the team: no policy's command could prevent them.
-
-    Args:
-        record: a game.
-        driven: (T, n) boats that the game drove in each step.
-        side: the team in question, 0 blue or 1 red.
-        radii_m: radii at which to count.
+    """Count the breaches of a team in which the game drove (T, n) a boat of it: no policy's command could prevent them.
 
     Returns:
         Per radius ``breaches_driven_2.5m`` and so on, and of them those of two own boats,

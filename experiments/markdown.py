@@ -21,7 +21,7 @@ def line(content: object) -> str:
 
 def cell(content: object) -> str:
     """Text of a table's cell: as `line`, and no bar ends it. Code in backticks is for our own words."""
-    text = str(content)
+    text = str(getattr(content, "text", content))
     ours = text.startswith("`") and text.endswith("`") and text.count("`") == 2
     return (visible(text) if ours else line(text)).replace("|", "\\|")
 
@@ -41,5 +41,4 @@ def goals_table(goals: Sequence[Mapping[str, Any]]) -> list[str]:
 
 def goals_of(content: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
     """Goals of results, which those of 0.8.0 and before call bars."""
-    found: Sequence[Mapping[str, Any]] = content["goals"] if "goals" in content else content["bars"]
-    return found
+    return content.get("goals") or content.get("bars") or ()

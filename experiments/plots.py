@@ -15,7 +15,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from markupsafe import escape
 from steerclear.shield.foreign import visible
+
+from .tables import number_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -76,13 +79,7 @@ def label(words: str) -> str:
 
 
 def bars(groups: Labelled, axis_words: str, reference: float | None = None) -> Figure:
-    """Draw groups of bars with their intervals, from top to bottom.
-
-    Args:
-        groups: what to draw; the state is the colour's name.
-        axis_words: text of the axis.
-        reference: a value to mark with a line.
-    """
+    """Draw groups of bars (a state is a colour's name) with their intervals, and a line at ``reference``."""
     lines = sum(len(group) for _, group in groups)
     canvas, axis = _canvas(0.7 + 0.21 * lines + 0.12 * len(groups))
     y, places = 0.0, []
@@ -97,35 +94,24 @@ def bars(groups: Labelled, axis_words: str, reference: float | None = None) -> F
 
 
 def _bar(axis: Any, y: float, colour: str, figure: Mapping[str, Any]) -> None:
-    value, low, high = (_number(figure.get(name)) for name in ("value", "low", "high"))
-    if value is None:
+    value, low, high = (figure.get(name) for name in ("value", "low", "high"))
+    if value is None or value != value:
         axis.text(0.0, y, " -", va="center", color=COLOURS["ink"])
         return
     axis.barh(y, value, 0.82, color=colour)
     end = value
-    if low is not None and high is not None:
+    if low is not None and high is not None and low == low and high == high:
         axis.errorbar(
             [value], [y], xerr=[[value - low], [high - value]], fmt="none", ecolor=COLOURS["ink"], capsize=2.5
         )
         end = max(value, high)
-    axis.annotate(short(value), (end, y), (4, 0), textcoords="offset points", va="center", color=COLOURS["ink"])
-
-
-def short(value: float) -> str:
-    """A number with about three digits."""
-    return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.1f}" if abs(value) >= 10 else f"{value:.2f}"
+    axis.annotate(number_text(value), (end, y), (4, 0), textcoords="offset points", va="center", color=COLOURS["ink"])
 
 
 def dots(
     groups: Sequence[tuple[str, Sequence[tuple[str, Sequence[float]]]]], axis_words: str, reference: float | None = None
 ) -> Figure:
-    """Draw values as dots, those alike on top of each other.
-
-    Args:
-        groups: label and, per state, its name and values.
-        axis_words: text of the axis.
-        reference: a value to mark with a line.
-    """
+    """Draw values as dots, those alike on top of each other: per group its label and, per state, name and values."""
     rows = [(name, state, values) for name, group in groups for state, values in group]
     most = max([*(v for *_, values in rows for v in values), reference or 0.0, 1e-9])
     each = max(1, math.ceil(max((len(values) for *_, values in rows), default=0) / MOST_DOTS))
@@ -157,12 +143,7 @@ def _stacks(values: Sequence[float], most: float) -> list[tuple[float, int]]:
 
 
 def shares(groups: Sequence[tuple[str, Sequence[tuple[str, float]]]], axis_words: str) -> Figure:
-    """Draw one bar per group, made of its parts.
-
-    Args:
-        groups: label and, per part, its name and percent; parts come in the same order everywhere.
-        axis_words: text of the axis.
-    """
+    """Draw one bar per group, made of its parts (name and percent), which come in the same order everywhere."""
     canvas, axis = _canvas(0.7 + 0.34 * len(groups))
     for y, (_, parts) in enumerate(groups):
         left = 0.0
@@ -175,12 +156,7 @@ def shares(groups: Sequence[tuple[str, Sequence[tuple[str, float]]]], axis_words
 
 
 def _ended(
-    axis: Any,
-    places: Sequence[float],
-    names: Sequence[str],
-    words: str,
-    reference: float | None,
-    turned: bool = True,
+    axis: Any, places: Sequence[float], names: Sequence[str], words: str, reference: float | None, turned: bool = True
 ) -> None:
     axis.set_yticks(places, names)
     axis.tick_params(axis="y", length=0, labelcolor=COLOURS["ink"])
@@ -194,13 +170,7 @@ def _ended(
 
 
 def curves(series: Sequence[tuple[str, str, Sequence[float], Sequence[float]]], reference: float, words: str) -> Figure:
-    """Draw distributions: share of all below a value.
-
-    Args:
-        series: name, colour's name, values, shares (0 to 1).
-        reference: a value to mark.
-        words: text of the axis.
-    """
+    """Draw distributions, share of all below a value: name, colour's name, values, shares (0 to 1)."""
     canvas, axis = _canvas(2.0, width_in=3.6)
     for _, colour, x, y in series:
         axis.plot(x, y, color=COLOURS[colour], lw=1.5)
@@ -213,18 +183,19 @@ def curves(series: Sequence[tuple[str, str, Sequence[float], Sequence[float]]], 
 
 
 def off_on(groups: Sequence[Mapping[str, Any]], metrics: Sequence[tuple[str, str]]) -> Figure:
-    """Draw metrics of all pairings without and with the shield, side by side, with their intervals.
-
-    Args:
-        groups: summaries of pairings, as `ablation.pairings_of` gives.
-        metrics: key and title of each.
-    """
+    """Draw metrics (key and title) of all pairings (of `ablation.pairings_of`) off and on, side by side."""
     canvas, axes = _canvas(3.2, max(len(metrics), 2), 4.0 * max(len(metrics), 2))
     for axis, (key, title) in zip(axes, metrics, strict=False):
         figures = [pairing["metrics"][key] for pairing in groups]
         states = ["off", "on", *(["covered"] if any("covered" in figure for figure in figures) else [])]
         for k, state in enumerate(states):
-            _columns(axis, (k - (len(states) - 1) / 2) * 0.72 / len(states), 0.68 / len(states), state, figures)
+            shift = (k - (len(states) - 1) / 2) * 0.72 / len(states)
+            shown = [(x + shift, figure[state]) for x, figure in enumerate(figures) if state in figure]
+            values = np.array([(f["value"], f["low"], f["high"]) for _, f in shown], dtype=np.float64).reshape(-1, 3)
+            spread = np.nan_to_num(np.abs(values[:, [1, 2]] - values[:, [0]]).T)
+            places = [x for x, _ in shown]
+            axis.bar(places, values[:, 0], 0.68 / len(states), color=COLOURS[state], label=f"shield {state}")
+            axis.errorbar(places, values[:, 0], spread, fmt="none", ecolor=COLOURS["ink"], capsize=3)
         names = [text(pairing["pairing"].replace(" vs ", "\nvs ")) for pairing in groups]
         axis.set_xticks(np.arange(len(groups)), names, color=COLOURS["ink"])
         axis.set_title(title, fontsize=9)
@@ -235,13 +206,7 @@ def off_on(groups: Sequence[Mapping[str, Any]], metrics: Sequence[tuple[str, str
 def scatter(
     panels: Sequence[tuple[str, Sequence[tuple[str, float, float, float]]]], words: tuple[str, str], lines: bool = False
 ) -> Figure:
-    """Draw points, a panel each; a name has the same colour and mark in all of them.
-
-    Args:
-        panels: title, and points: name, x, y, upper limit of y.
-        words: texts of both axes.
-        lines: whether points of a name are joined.
-    """
+    """Draw panels of points (name, x, y, upper limit of y); a name looks the same in all; ``lines`` join its points."""
     across = min(len(panels), 3)
     down = math.ceil(len(panels) / across)
     canvas, axes = _canvas(3.4 * down + 0.4, across, 4.2 * across, down)
@@ -272,26 +237,8 @@ def scatter(
     return canvas
 
 
-def _columns(axis: Any, shift: float, width: float, state: str, figures: Sequence[Mapping[str, Any]]) -> None:
-    shown = [(x + shift, figure[state]) for x, figure in enumerate(figures) if state in figure]
-    values = np.array([(f["value"], f["low"], f["high"]) for _, f in shown], dtype=np.float64).reshape(-1, 3)
-    spread = np.nan_to_num(np.abs(values[:, [1, 2]] - values[:, [0]]).T)
-    places = [x for x, _ in shown]
-    axis.bar(places, values[:, 0], width, color=COLOURS[state], label=f"shield {state}")
-    axis.errorbar(places, values[:, 0], spread, fmt="none", ecolor=COLOURS["ink"], capsize=3)
-
-
-def _number(value: Any) -> float | None:
-    return None if value is None or value != value else float(value)
-
-
 def svg(figure: Figure, words: str) -> str:
-    """The figure as an ``svg`` element whose colours are the page's.
-
-    Args:
-        figure: what to write.
-        words: what it shows, for who cannot see it.
-    """
+    """The figure as an ``svg`` element whose colours are the page's; ``words`` for who cannot see it."""
     buffer = io.StringIO()
     figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
     content = buffer.getvalue()
@@ -300,8 +247,6 @@ def svg(figure: Figure, words: str) -> str:
     content = content.replace("#1f77b4", COLOURS["ink"])  # of marks that were given no fill: they have no area
     for name, colour in COLOURS.items():
         content = content.replace(colour, f"var(--{name})")
-    from markupsafe import escape
-
     return content.replace("<svg", f'<svg role="img" aria-label="{escape(words)}"', 1)
 
 

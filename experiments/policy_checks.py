@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from steerclear import policies
 from steerclear.env.config import GameConfig
@@ -17,16 +18,34 @@ from steerclear.policies.submissions.made_for import MadeFor, check_game, made_f
 from steerclear.shield.exceptions import ConfigError
 
 from .entries.team import is_entry, make_team
+from .play.conditions import CALM, Conditions, check_current
+from .play.spec import check_shield
+from .play.spec import words_of_less as words_of_less_kept
 
 Say = Callable[[str], None]
 
 
-def try_policies(names: Sequence[str], trust: bool, game: GameConfig, say: Say) -> None:
-    """Load each policy once, those from files in a process of their own; say which learned in another game.
+def check_run(
+    names: Sequence[str],
+    game: GameConfig,
+    shield: Mapping[str, Any] | None,
+    say: Say,
+    conditions: Conditions = CALM,
+    trust: bool = False,
+    many: bool = True,
+) -> None:
+    """Find every bad name or number before the first game is played, and say what is to be known of them.
+
+    Each policy is loaded once, those from files in a process of their own; ``many``: nobody sits at the keyboard.
 
     Raises:
-        PolicyError: one cannot be loaded, or is a model of others and not trusted.
+        SteerclearError: a policy cannot be loaded, or is of others and not trusted; a setting is unusable.
     """
+    check_current(conditions, game)
+    if shield is not None:
+        say_of_distance(check_shield(shield, game).separation_m, game, say)
+    if many and KEYBOARD in names:
+        raise ConfigError(f"{KEYBOARD!r} needs a window; play single games with: steerclear play --own {KEYBOARD}")
     say_what_runs(names, trust, say)
     for name in dict.fromkeys(names):
         team = make_team(name, trust=trust)
@@ -35,35 +54,25 @@ def try_policies(names: Sequence[str], trust: bool, game: GameConfig, say: Say) 
     say_of_elsewhere(names, game, say)
 
 
-def check_no_keyboard(names: Sequence[str]) -> None:
-    """Refuse the keyboard where many games are played.
-
-    Raises:
-        ConfigError: it is among the policies.
-    """
-    if KEYBOARD in names:
-        raise ConfigError(f"{KEYBOARD!r} needs a window; play single games with: steerclear play --own {KEYBOARD}")
+def say_of_distance(kept_m: float, game: GameConfig, say: Say) -> None:
+    """Say, once a command, that its shield keeps less than the distance at which the game counts collisions."""
+    if words := words_of_less_kept(kept_m, game):
+        say(words)
 
 
 def say_of_elsewhere(names: Sequence[str], game: GameConfig, say: Say) -> None:
-    """Say, once a command, of each policy that learned by the rules of another preset than the game's.
-
-    So of a shield in an entry that keeps less than this game counts.
+    """Say of each policy that learned by other rules, and of a shield in an entry that keeps less than the game counts.
 
     Raises:
         PolicyError: the file of one cannot be read, or the shield in it is for another game.
     """
     for name in dict.fromkeys(names):
-        for words in filter(None, (words_of_elsewhere(name, game), words_of_shield(name, game))):
+        for words in filter(None, (words_of_elsewhere(name, game), _words_of_shield(name, game))):
             say(words)
 
 
 def say_what_runs(names: Sequence[str], trust: bool, say: Say) -> None:
-    """Say of each model, before any is loaded, that loading runs its code.
-
-    Raises:
-        PolicyError: there is no such model, it is one network of two, or one of others and not trusted.
-    """
+    """Say of each model, before any is loaded, that loading runs its code; PolicyError where it may not, or cannot."""
     for name in dict.fromkeys(names):
         if is_entry(name) and name.startswith(SB3_PREFIX):
             policies.check(name)
@@ -74,27 +83,22 @@ def say_what_runs(names: Sequence[str], trust: bool, say: Say) -> None:
 
 
 def words_of_elsewhere(policy: str, game: GameConfig) -> str:
-    """What to say of a policy that learned by the rules of another preset; nothing where it did not, or none is known.
-
-    Raises:
-        PolicyError: its file cannot be read.
-    """
+    """What to say of a policy that learned by the rules of another preset; else nothing."""
     made = made_of(policy)
     preset = learned_in(policy) if made is None or made.shielded else made.preset
     if preset in ("", game.preset_name):
         return ""
+    steps, learned_s = "", GameConfig.preset(preset).decision_s if preset in PRESETS else game.decision_s
+    if not math.isclose(learned_s, game.decision_s):  # then its decisions last longer, or not as long
+        here_s, times = game.decision_s, game.decision_s / learned_s
+        steps = f", where a step is {here_s:g} s, not {learned_s:g} s, and its decisions last {times:g} times as long"
     return (
-        f"{policy} learned in preset {preset} and plays {game.preset_name} here{_steps(preset, game)}: it may "
+        f"{policy} learned in preset {preset} and plays {game.preset_name} here{steps}: it may "
         f"play badly; play it by preset {preset}, or let it learn on by these rules (start: in docs/train.md)"
     )
 
 
-def words_of_shield(policy: str, game: GameConfig) -> str:
-    """What to say of an entry with a shield that keeps less than the distance at which a game counts; else nothing.
-
-    Raises:
-        PolicyError: the shield in it is for decisions of another length, or for other boats.
-    """
+def _words_of_shield(policy: str, game: GameConfig) -> str:
     made = made_of(policy)
     if made is None:
         return ""
@@ -105,14 +109,3 @@ def words_of_shield(policy: str, game: GameConfig) -> str:
 def made_of(policy: str) -> MadeFor | None:
     """What an entry says of itself, see `made_for`; None for named policies and models."""
     return made_for(policy) if is_entry(policy) and not policy.startswith(SB3_PREFIX) else None
-
-
-def _steps(preset: str, game: GameConfig) -> str:
-    """What a decision that is held for so many steps comes to here, where steps are not as long."""
-    if preset not in PRESETS:
-        return ""
-    learned_s = GameConfig.preset(preset).decision_s
-    if math.isclose(learned_s, game.decision_s):
-        return ""
-    here_s, times = game.decision_s, game.decision_s / learned_s
-    return f", where a step is {here_s:g} s, not {learned_s:g} s, and its decisions last {times:g} times as long"

@@ -13,19 +13,9 @@ from pathlib import Path
 from typing import Any
 
 PACKAGES = (
-    "steerclear",
-    "numpy",
-    "scipy",
-    "numba",
-    "qpsolvers",
-    "daqp",
-    "osqp",
-    "gymnasium",
-    "pettingzoo",
-    "torch",
+    *("steerclear", "numpy", "scipy", "numba", "qpsolvers", "daqp", "osqp", "gymnasium", "pettingzoo", "torch"),
     "kairos-planner",
 )
-
 SOURCES = ("*.py", "*.npz", "shipped/*.yaml")
 """Code, tables and weights, boats."""
 NO_GAME = (
@@ -33,8 +23,8 @@ NO_GAME = (
     "env/render/",
     "experiments/sim_boats/",
     *(f"experiments/{name}.py" for name in ("docs", "docs_encounters", "docs_keys", "markdown", "page", "plots")),
-    *(f"experiments/{name}.py" for name in ("report", "replay_data", "replay_html", "tables", "terminal")),
-    *(f"experiments/{name}" for name in ("cli", "console", "saving", "tournament_pages")),
+    *(f"experiments/{name}.py" for name in ("report", "replay_html", "tables", "terminal")),
+    *(f"experiments/{name}" for name in ("cli", "console", "tournament_pages")),
 )
 """How the names of files begin whose code changes no result that is kept on disk."""
 

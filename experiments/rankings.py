@@ -23,9 +23,8 @@ Row = Mapping[str, Any]
 RESAMPLES = 2000
 WEIGHTS = (0.25, 0.025)
 """Both weights of a collision: the one that fits the paper's Table 3, and the one its rules name."""
-FIGURES = (
-    *("captures", "grabs", "tags", "collisions", "hits_teammate", "hits_opponent"),
-    *("captures_against", "grabs_against", "tags_against"),
+FIGURES = tuple(["captures", "grabs", "tags", "collisions", "hits_teammate", "hits_opponent"]) + tuple(
+    f"{name}_against" for name in ("captures", "grabs", "tags")
 )
 CAPTURES, COLLISIONS, AGAINST = (FIGURES.index(name) for name in ("captures", "collisions", "captures_against"))
 GAME = ("blue", "red", "repetition")
@@ -150,13 +149,7 @@ def ranks_of(figures: Array, penalty: float) -> Array:
 
 
 def standings(totals: Totals, penalty: float, seed: int) -> list[dict[str, Any]]:
-    """The table of one state, best first; limits are None with fewer than two repetitions.
-
-    Args:
-        totals: its games.
-        penalty: weight that ranks.
-        seed: of the bootstrap.
-    """
+    """The table of one state, best first by the penalty; limits are None with fewer than two repetitions."""
     sums = totals.sums()
     found: dict[str, Any] = {
         "rank": ranks_of(sums, penalty).astype(int),
@@ -183,15 +176,7 @@ def standings(totals: Totals, penalty: float, seed: int) -> list[dict[str, Any]]
 
 
 def state_results(table: pd.DataFrame, state: str, teams: Sequence[str], penalty: float, seed: int) -> dict[str, Any]:
-    """Tables of one state.
-
-    Args:
-        table: `seats` of the final, of all states.
-        state: which.
-        teams: names, in order.
-        penalty: weight that ranks.
-        seed: of the bootstrap.
-    """
+    """Tables of one state, from `seats` of the final."""
     mine = table[table["state"] == state] if len(table) else table
     playing = [team for team in teams if len(mine) and (mine["team"] == team).any()]
     totals = Totals.of(mine, playing)
@@ -211,25 +196,18 @@ def state_results(table: pd.DataFrame, state: str, teams: Sequence[str], penalty
 def qualifying_table(
     table: pd.DataFrame, states: Sequence[str], teams: Sequence[str], penalty: float
 ) -> list[dict[str, Any]]:
-    """Mean primary score per game of each team in each state, best first; each is scored by its own games alone.
-
-    Args:
-        table: `seats` of the qualifying.
-        states: in order.
-        teams: names, in order.
-        penalty: weight of a collision.
-    """
+    """Mean primary score per game of each team in each state, best first; each is scored by its own games alone."""
     found: list[dict[str, Any]] = []
+    own = table[table["examined"] == table["side"]] if len(table) else table
     for state in states:
         lines = []
-        for team in teams if len(table) else ():
-            examined = table["examined"] == table["side"]
-            own = table[(table["state"] == state) & (table["team"] == team) & examined]
-            if len(own):
-                score = (own["net_captures"] - penalty * own["collisions"]).mean()
-                line = {"team": team, "state": state, "games": len(own), "score": float(score)}
-                lines.append(line | {"captures": int(own["captures"].sum())})
-        found += sorted(lines, key=lambda line: -float(line["score"]))
+        for team in teams if len(own) else ():
+            games = own[(own["state"] == state) & (own["team"] == team)]
+            if len(games):
+                score = float((games["net_captures"] - penalty * games["collisions"]).mean())
+                line = {"team": team, "state": state, "games": len(games), "score": score}
+                lines.append(line | {"captures": int(games["captures"].sum())})
+        found += sorted(lines, key=lambda line: -line["score"])
     return found
 
 
@@ -261,9 +239,6 @@ def alpha_rank(wins: Array, strength: float, population: int = POPULATION) -> Ar
         wins: (n, n) payoffs of the row against the column.
         strength: of selection, per unit of payoff.
         population: members.
-
-    Returns:
-        (n,) shares that add up to 1.
     """
     n = len(wins)
     payoffs = np.where(np.isfinite(wins), wins, 0.5)
@@ -295,17 +270,10 @@ def cycles(wins: Array, teams: Sequence[str]) -> list[str]:
 
 
 def prices(table: pd.DataFrame, teams: Sequence[str], off: str, on: str, seed: int) -> list[dict[str, Any]]:
-    """What the shield costs each team and what it brings, from games of two states from the same seeds.
-
-    Args:
-        table: `seats` of all states.
-        teams: names.
-        off: the state without shields.
-        on: the state with them.
-        seed: of the bootstrap.
+    """What the shield costs each team and what it brings, from games (`seats`) of two states from the same seeds.
 
     Returns:
-        Per team the figures `tournament_keys.TOURNAMENT` describes under ``prices[]``.
+        Per team the figures of ``prices[]`` in `docs_keys.KEYS`.
     """
     if table.empty:
         return []

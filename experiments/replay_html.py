@@ -1,17 +1,150 @@
-"""A replay to scrub in a browser: one HTML file that holds the games, needs no server and loads nothing."""
+"""A game saved as its file's name asks: a replay to scrub in a browser, which needs no server; data, film, picture.
+
+Replays pack a record into text small enough to sit inside a page. Every number becomes a code of 16 (or 8) bits:
+value = offset + scale * code, the largest code standing for NaN where there may be one. A column holds one series per
+boat and coordinate, each over all time indices. Codes are stored as differences modulo 2**bits, from the time index
+before (``against`` = "previous") or from another column (``sent`` from ``wanted``), which deflate then shrinks. All
+columns of a game are one run of bytes, little-endian, deflated and in base64. ``templates/replay_data.js`` is the
+reader.
+"""
 
 from __future__ import annotations
 
+import base64
 import os
+import zlib
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from steerclear.env.record import Record, read_meta
+import numpy as np
+from numpy.typing import NDArray
+from steerclear.env.record import Record, read_meta, save, validate
+from steerclear.env.render import Arena
 from steerclear.shield.exceptions import ConfigError
 
+from .console import progress
+from .game_metrics import PairDistances
 from .page import SCRIPT_SOURCES, as_json, render, write_page
-from .replay_data import pack
+
+FULL_TURN_DEG = 360.0
+LAST_CODE = 2**16 - 1
+HAS_FLAG, TAGGED, OUT = 1, 2, 4
+SHOWN = (
+    *("dt_s", "env_bounds_m", "agent_ids", "team", "flag_home", "catch_radius_m", "flag_keepout_m", "separation_m"),
+    *("preset", "policies", "shielded", "seed", "reason_names", "platforms"),
+)
+"""What a page shows of a game's settings."""
+
+
+@dataclass
+class Packer:
+    """Collects columns, JSON-ready as described, and their bytes."""
+
+    columns: list[dict[str, Any]] = field(default_factory=list)
+    content: list[bytes] = field(default_factory=list)
+    _codes: dict[str, NDArray[Any]] = field(default_factory=dict)
+
+    def add_codes(self, name: str, codes: NDArray[Any], against: str | None, **scale: float) -> None:
+        """Add a column of codes (series, time), uint16 or uint8, with its ``offset``, ``scale`` and ``nan``."""
+        self._codes[name] = codes
+        stored = codes
+        if against == "previous":
+            stored = np.diff(codes, axis=1, prepend=np.zeros((len(codes), 1), codes.dtype))
+        elif against is not None:
+            stored = codes - self._codes[against]
+        kind = codes.dtype.newbyteorder("<")
+        entry = {
+            "name": name,
+            "start": sum(map(len, self.content)),
+            "length": int(codes.size),
+            "rows": int(codes.shape[1]),
+            "bits": 8 * codes.dtype.itemsize,
+            "against": against,
+        }
+        self.columns.append(entry | scale)
+        self.content.append(np.ascontiguousarray(stored, dtype=kind).tobytes())
+
+    def add_numbers(
+        self, name: str, values: NDArray[Any], against: str | None, limits: tuple[float, float] | None = None
+    ) -> None:
+        """Add a column of numbers (series, time), NaN kept; the same limits give the same numbers the same codes."""
+        offset, high = limits or span(values)
+        scale = (high - offset) / (LAST_CODE - 1) or 1.0
+        codes = np.full(values.shape, LAST_CODE, dtype=np.uint16)
+        usable = np.isfinite(values)
+        codes[usable] = np.round((values[usable] - offset) / scale)
+        self.add_codes(name, codes, against, offset=offset, scale=scale, nan=LAST_CODE)
+
+    def add_angles(self, name: str, values_deg: NDArray[Any], against: str | None) -> None:
+        """Add a column of angles, deg; where not finite the angle is 0, and another column must tell."""
+        turns = np.where(np.isfinite(values_deg), values_deg, 0.0) / FULL_TURN_DEG
+        codes = np.round(turns * (LAST_CODE + 1)).astype(np.int64).astype(np.uint16)
+        self.add_codes(name, codes, against, offset=0.0, scale=FULL_TURN_DEG / (LAST_CODE + 1))
+
+
+def pack(record: Record, title: str, compress: bool = True) -> dict[str, Any]:
+    """Pack a record, JSON-ready; without ``compress`` a page needs no newer browser but is some three times as large.
+
+    Raises:
+        TraceError: the record is incomplete.
+    """
+    validate(record)
+    packer, states = Packer(), len(record["position"])
+    packer.add_numbers("position", record["position"].reshape(states, -1).T, "previous")
+    packer.add_angles("heading", record["heading_deg"].T, "previous")
+    packer.add_numbers("speed", record["speed_mps"].T, "previous")
+    packer.add_numbers("flag_position", record["flag_position"].reshape(states, -1).T, "previous")
+    bits = HAS_FLAG * record["has_flag"] + TAGGED * record["is_tagged"] + OUT * record["oob"]
+    packer.add_codes("bits", bits.T.astype(np.uint8), None)
+    # a command counts where speed and heading are finite
+    wanted, sent = (
+        np.where(np.isfinite(one).all(axis=-1, keepdims=True), one, np.nan)
+        for one in (record["wanted"], record["sent"])
+    )
+    limits = span(np.stack([wanted[..., 0], sent[..., 0]]))
+    packer.add_numbers("wanted_speed", wanted[..., 0].T, "previous", limits)
+    packer.add_numbers("sent_speed", sent[..., 0].T, "wanted_speed", limits)
+    packer.add_angles("wanted_heading", wanted[..., 1].T, "previous")
+    packer.add_angles("sent_heading", sent[..., 1].T, "wanted_heading")
+    packer.add_numbers("certificate", record["safety_margin_m"].T.astype(np.float64), "previous")
+    packer.add_codes("reason", record["reason"].T.astype(np.uint8), None)
+    packer.add_codes("intervened", record["intervened"].T.astype(np.uint8), None)
+    content = b"".join(packer.content)
+    return {
+        "title": title,
+        "meta": page_meta(record),
+        "steps": len(record["wanted"]),
+        "columns": packer.columns,
+        "breaches": np.round(record["breaches"], 3).tolist(),
+        "captures": score_changes(record["captures"]),
+        "deflated": compress,
+        "data": base64.b64encode(zlib.compress(content, 9) if compress else content).decode(),
+    }
+
+
+def span(values: NDArray[Any]) -> tuple[float, float]:
+    """Return the smallest and largest finite value; zeros where there is none."""
+    finite = values[np.isfinite(values)]
+    return (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
+
+
+def score_changes(captures: NDArray[Any]) -> list[list[int]]:
+    """Return [step, blue, red] for the start and for every step at which the score changes."""
+    changed = np.flatnonzero(np.any(np.diff(captures, axis=0) != 0, axis=1)) + 1
+    return [[int(step), *map(int, captures[step])] for step in (0, *changed)]
+
+
+def page_meta(record: Record) -> Mapping[str, Any]:
+    """Return what the page needs to know of a game."""
+    meta = read_meta(record)
+    arena = Arena.from_meta(meta)
+    circles = [[o.radius_m, o.points_m[0]] for o in arena.obstacles if o.radius_m > 0.0]
+    polygons = [o.points_m for o in arena.obstacles if o.radius_m == 0.0]
+    drawn = {"scrimmage": arena.scrimmage_m, "obstacles": {"circle": circles, "polygon": polygons}}
+    return {key: meta[key] for key in SHOWN} | drawn
+
 
 SCRIPTS = tuple(f"replay_{part}.js" for part in ("data", "labels", "draw", "timeline", "pane", "app"))
 
@@ -22,38 +155,25 @@ def write_replay(
     title: str = "steerclear replay",
     compress: bool = True,
 ) -> Path:
-    """Write a replay.
+    """Write a replay of one record or several.
 
     Several games can be chosen from a list and shown side by side, scrubbed together; the first two are shown
-    at the start. A link to ``replay.html#t=12.5`` opens it at that time.
-
-    Args:
-        records: One record or several.
-        path: File to write.
-        title: Heading of the page.
-        compress: Deflate the games; without, the file is larger but opens in browsers older than 2023, too.
-
-    Returns:
-        The path written.
+    at the start. A link to ``replay.html#t=12.5`` opens it at that time. Without ``compress`` the file is larger but
+    opens in browsers older than 2023, too.
 
     Raises:
-        TraceError: A record is incomplete.
-        ConfigError: There is no record, or the file cannot be written.
+        TraceError: a record is incomplete.
+        ConfigError: there is no record, or the file cannot be written.
     """
     games = [records] if isinstance(records, Mapping) else list(records)
     if not games:
         raise ConfigError("there is no record to replay; pass at least one.")
     metas = [read_meta(game) for game in games]
-    own = {"own_team": own_team(metas)}
-    packed = [pack(game, name, compress) | own for game, name in zip(games, _titles(metas), strict=True)]
+    own, names = {"own_team": own_team(metas)}, [game_title(meta) for meta in metas]
+    titles = [name if names.count(name) == 1 else f"{k}. {name}" for k, name in enumerate(names, start=1)]
+    packed = [pack(game, name, compress) | own for game, name in zip(games, titles, strict=True)]
     data = as_json({"games": packed})
     return write_page(path, render("replay.html", title=title, data=data, scripts=SCRIPTS, sources=SCRIPT_SOURCES))
-
-
-def _titles(metas: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return a name for each game; equal ones are numbered."""
-    names = [game_title(meta) for meta in metas]
-    return [name if names.count(name) == 1 else f"{k}. {name}" for k, name in enumerate(names, start=1)]
 
 
 def own_team(metas: Sequence[Mapping[str, Any]]) -> int:
@@ -69,3 +189,54 @@ def game_title(meta: Mapping[str, Any]) -> str:
     """Return the game's own title or who plays whom, and whether a shield is on."""
     blue, red = (meta["policies"].get(side) or side for side in ("blue", "red"))
     return f"{meta.get('title') or f'{blue} – {red}'}, {'shield on' if meta['shielded'] else 'shield off'}"
+
+
+ENDINGS = (".npz", ".html", ".mp4", ".gif", ".png")
+
+
+def check_endings(paths: Sequence[Path]) -> None:
+    """Refuse (ConfigError) names whose ending says no form that a game is saved in."""
+    for path in paths:
+        if path.suffix.lower() not in ENDINGS:
+            raise ConfigError(f"cannot save {path.name!r}; end the name in one of {', '.join(ENDINGS)}")
+
+
+def save_record(record: Record, path: Path, at_s: float | None = None, speedup: float = 4.0) -> Path:
+    """Write a record in the form of the name's ending.
+
+    Args:
+        record: the game.
+        path: where to.
+        at_s: moment that a picture shows, s; None takes the closest approach.
+        speedup: times faster than the game, for films.
+
+    Raises:
+        ConfigError: the moment is not in the game, or the place cannot be written to.
+    """
+    ending = path.suffix.lower()
+    if ending == ".npz":
+        return save(record, path)
+    if ending == ".html":
+        return write_replay(record, path)
+    from steerclear.env.render import save_animation, save_frame  # draws with pygame: only where a picture is wanted
+
+    if ending == ".png":
+        return save_frame(record, _closest_step(record) if at_s is None else _step_at(record, at_s), path)
+    with progress(ending[1:], len(record["wanted"])) as notice:
+        return save_animation(record, path, speedup=speedup, progress=notice)
+
+
+def _step_at(record: Record, at_s: float) -> int:
+    dt_s, steps = float(read_meta(record)["dt_s"]), len(record["wanted"])
+    if not -0.5 * dt_s <= at_s <= (steps + 0.5) * dt_s:
+        raise ConfigError(f"--at is {at_s:g}; the game has 0 to {steps * dt_s:g} s")
+    return min(max(round(at_s / dt_s), 0), steps)
+
+
+def _closest_step(record: Record) -> int:
+    """The step at which a shielded boat (any boat, without a shield) is closest to another."""
+    covered: Any = record["intervened"].any(axis=0)
+    distances = PairDistances.of(record["position"])
+    if covered.any():
+        distances = distances.of_pairs(covered[distances.pairs].any(axis=1))
+    return int(np.argmin(distances.distance_m.min(axis=1))) + 1 if distances.distance_m.size else 0

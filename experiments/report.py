@@ -1,22 +1,24 @@
-"""Reports: what an experiment shows, as data, and the one HTML page that is made of it."""
+"""Reports: what an experiment shows, as data, and the page that is made of it, in HTML or in Markdown."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from markupsafe import Markup
 
 from . import plots
-from .metrics import RADII_M, REASONS, breach_column, game_metrics_of, meanings_of
+from .markdown import MADE, goals_of, goals_table, line, table
+from .metrics import RADII_M, REASONS, breach_column, game_metrics_of
 from .page import render, write_page
 from .play.conditions import words_of
-from .tables import COVERED_WORDS, columns_of, goal_cells, interval_text, limits_text, number_text
+from .tables import COVERED_WORDS, Table, columns_of, goal_cells, interval_text, limits_text, number_text
 from .verdicts import COVERED, HEADS, OFF, ON, state_of, verdict_rows
 
+__all__ = ["Plot", "Report", "Section", "Table", "Tile"]
 Summary = Mapping[str, Any]
 SHIELDS = ((OFF, "shield off"), (ON, "shield on"), (COVERED, "shield on, covering boats that the game drives"))
 MOST_ROWS, MOST_BREACHES = 600, 200
@@ -50,14 +52,7 @@ class Tile(NamedTuple):
 
 
 class Plot(NamedTuple):
-    """A plot of the page.
-
-    Attributes:
-        title: above it.
-        svg: the plot.
-        legend: colour's name and what it stands for.
-        meanings: words in it and what they mean.
-    """
+    """A plot of the page, with the names of its colours, and the meanings of words in it."""
 
     title: str
     svg: Markup
@@ -66,21 +61,8 @@ class Plot(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Table:
-    """A table of the page; ``folded`` ones are opened by a click, ``numbers`` are those with right columns."""
-
-    title: str
-    heads: Sequence[str]
-    rows: Sequence[Sequence[Any]]
-    note: str = ""
-    more: str = ""
-    folded: bool = False
-    numbers: bool = True
-
-
-@dataclass(frozen=True)
 class Section:
-    """Tables and small plots under a heading; ``wide`` puts each table on a line of its own."""
+    """Tables and small plots under a heading; ``wide``: each table on a line of its own."""
 
     title: str
     tables: Sequence[Table] = ()
@@ -91,19 +73,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Report:
-    """A page.
-
-    Attributes:
-        title: of it.
-        subtitle: what was measured, in a line.
-        warnings: sentences that a reader has to know first.
-        tiles: headline numbers.
-        links: ``label`` and ``path`` of each replay.
-        goals: as `metrics.check` returns them.
-        plots: large ones.
-        notes: sentences below them.
-        sections: the rest.
-    """
+    """A page: warnings, headline numbers, links (``label``, ``path``) to replays, goals, large plots, the rest."""
 
     title: str
     subtitle: str
@@ -113,16 +83,32 @@ class Report:
     goals: Sequence[Mapping[str, Any]] = ()
     plots: Sequence[Plot] = ()
     notes: Sequence[str] = ()
-    sections: Sequence[Section] = field(default_factory=tuple)
+    sections: Sequence[Section] = ()
 
     def write(self, path: str | os.PathLike[str]) -> Path:
-        """Write the page.
-
-        Raises:
-            ConfigError: the file cannot be written.
-        """
-        shown = {**{name: getattr(self, name) for name in self.__dataclass_fields__}, "goals": goal_rows(self.goals)}
+        """Write the page; ConfigError where it cannot be written."""
+        shown = {**vars(self), "goals": goal_rows(self.goals)}
         return write_page(path, render("report.html", title=self.title, report=shown, sources=IMAGES))
+
+    def page(self, name: str, picture: Path | None = None) -> tuple[str, str, list[Path]]:
+        """The page in Markdown, as `docs` has it: file name, text, and the picture beside it.
+
+        Notes are our own words, with their marks; all else is shown as it is. What is folded is left out.
+        """
+        lines = [f"# {line(self.title)}", "", MADE, "", f"{line(self.subtitle)}." if self.subtitle else "", ""]
+        lines += [f"![{line(self.title)}]({picture.name})", ""] if picture else []
+        lines += [*(f"- {line(words)}" for words in self.warnings), *[""] * bool(self.warnings)]
+        lines += [part for note in self.notes for part in (note, "")]
+        for section in self.sections:
+            tables = [one for one in section.tables if not one.folded]
+            lines += [f"## {line(section.title)}", ""] if tables and section.title else []
+            lines += [line(section.note), ""] if tables and section.note else []
+            for one in tables:
+                lines += [f"{'###' if section.title else '##'} {line(one.title)}", ""] if one.title else []
+                lines += [line(one.note), ""] if one.note else []
+                lines += [*table(one.heads or [""] * len(one.rows[0]), one.rows), ""]
+        lines += ["## Goals", "", *goals_table(self.goals), ""] if self.goals else []
+        return name, "\n".join(lines), [picture] if picture else []
 
 
 def goal_rows(goals: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
@@ -140,16 +126,12 @@ def goal_rows(goals: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
 def made_of(results: Mapping[str, Any], failed: Sequence[Mapping[str, Any]] | None = None) -> Section:
     """How it was made: settings, versions, machine, and what could not be played."""
     machine = {**results["versions"], **(results.get("machine") or {})}
-    tables = [values_table("Settings and seeds", results["settings"]), values_table("Versions and machine", machine)]
+    named = {"Settings and seeds": results["settings"], "Versions and machine": machine}
+    tables = [Table(t, [], [[k, plain(v)] for k, v in values.items()], numbers=False) for t, values in named.items()]
     if failed is not None:
         title = "Games that could not be played"
-        tables.append(rows_table(title, failed) if failed else Table(title, [], [["None."]]))
+        tables.append(_rows_table(title, failed) if failed else Table(title, [], [["None."]]))
     return Section("How it was made", tables)
-
-
-def values_table(title: str, values: Mapping[str, Any]) -> Table:
-    """Names and values."""
-    return Table(title, [], [[name, plain(value)] for name, value in values.items()], numbers=False)
 
 
 def plain(value: Any) -> str:
@@ -161,8 +143,8 @@ def plain(value: Any) -> str:
     return "–" if value is None or value != value else str(value)
 
 
-def rows_table(title: str, rows: Sequence[Mapping[str, Any]], folded: bool = False) -> Table:
-    """The rows of games, the first `MOST_ROWS` of them; columns that no row has are left out."""
+def _rows_table(title: str, rows: Sequence[Mapping[str, Any]], folded: bool = False) -> Table:
+    """The first `MOST_ROWS` rows of games; columns that no row has are left out."""
     names = list(dict.fromkeys(name for row in rows for name in row))
     names = [name for name in names if any(row.get(name) is not None for row in rows)]
     body = [[_cell(row.get(name)) for name in names] for row in rows[:MOST_ROWS]]
@@ -177,63 +159,62 @@ def _cell(value: Any) -> str:
 
 
 def write_report(results: Mapping[str, Any], path: str | os.PathLike[str]) -> Path:
-    """Write the report of games off and on.
+    """Write `game_report`; ConfigError where it cannot be written."""
+    return game_report(results).write(path)
+
+
+def game_report(results: Mapping[str, Any]) -> Report:
+    """The report of games off and on.
 
     Args:
         results: ``settings`` (with ``separation_m``, its own or in ``shield``; 2.5 m when left out), ``versions``,
-            ``pairings`` (as `ablation.pairings_of` returns them), ``games`` (rows of games); and, where there are any,
-            ``goals``, ``warnings`` (sentences shown first), ``machine``, ``title``, ``quick``, ``failed`` (games that
-            could not be played) and ``replays`` ({"label", "path"}, the path seen from the report).
-        path: File to write.
-
-    Raises:
-        ConfigError: The file cannot be written.
+            ``pairings`` (as `ablation.pairings_of` returns them); and, where there are any, ``games`` (rows of games,
+            without which nothing is drawn), ``goals``, ``warnings`` (sentences shown first), ``machine``, ``title``,
+            ``quick``, ``failed`` (games that could not be played) and ``replays`` ({"label", "path"}, the path seen
+            from the report).
     """
-    separation_m = separation_of(results)
-    breaches = results.get("breaches") or ()
+    settings, pairings = results["settings"], results["pairings"]
+    separation_m = float(
+        settings.get("separation_m") or (settings.get("shield") or {}).get("separation_m") or RADII_M[0]
+    )
+    breaches, games = results.get("breaches") or (), results.get("games") or ()
     return Report(
-        title=results.get("title") or _played(results["settings"])[0],
+        title=results.get("title") or _played(settings)[0],
         subtitle=_subtitle(results, separation_m),
         warnings=results.get("warnings") or (),
-        tiles=_tiles(results["pairings"], separation_m),
+        tiles=_tiles(pairings, separation_m),
         links=results.get("replays") or (),
-        goals=results.get("goals") or (),
-        plots=_plots(results, separation_m),
+        goals=goals_of(results),
+        plots=_plots(pairings, games, separation_m) if games else (),
         notes=[NOTE],
         sections=[
-            Section("Pairings", [_pairing_table(pairing) for pairing in results["pairings"]]),
+            Section("Pairings", [_pairing_table(pairing) for pairing in pairings]),
             Section(
                 "Breaches judged in hindsight",
-                [
-                    *(_verdict_table(pairing) for pairing in results["pairings"]),
-                    *([_breaches_table(breaches)] if breaches else []),
-                ],
+                [*map(_verdict_table, pairings), *([_breaches_table(breaches)] if breaches else [])],
                 HINDSIGHT,
             ),
             made_of(results, results.get("failed") or []),
-            Section("", [rows_table("Every game", results["games"], folded=True)], wide=True),
+            Section("", [_rows_table("Every game", games, folded=True)], wide=True),
         ],
-    ).write(path)
-
-
-def separation_of(results: Mapping[str, Any]) -> float:
-    """Return the shield's separation radius, m."""
-    settings = results.get("settings") or {}
-    return float(settings.get("separation_m") or (settings.get("shield") or {}).get("separation_m") or RADII_M[0])
+    )
 
 
 def _subtitle(results: Mapping[str, Any], separation_m: float) -> str:
-    settings = results["settings"]
-    parts = [str(settings["preset"])] if settings.get("preset") else []
-    if settings.get("own"):
-        against = ", ".join(settings.get("opponents") or ())
-        parts.append(f"{settings['own']} against {against}" if against else str(settings["own"]))
-    count = len(results["games"])
-    parts.append(f"{count} game{'' if count == 1 else 's'}, {_played(settings)[1]}")
-    parts.append(f"separation {separation_m:g} m")
-    parts.append(words_of(settings.get("conditions") or {}))
-    parts.append("small version (--quick): its intervals are wide" if results.get("quick") else "")
-    return " · ".join(filter(None, parts))
+    settings, count = results["settings"], results.get("games_played", len(results.get("games") or ()))
+    seeds, version = results.get("seeds"), results["versions"].get("steerclear")
+    own, against = settings.get("own"), ", ".join(settings.get("opponents") or ())
+    parts = [
+        settings.get("preset"),
+        f"{own} against {against}" if own and against else own,
+        f"{count} game{'' if count == 1 else 's'}, {_played(settings)[1]}",
+        f"separation {separation_m:g} m",
+        words_of(settings.get("conditions") or {}),
+        f"seeds {seeds[0]} to {seeds[-1]}" if seeds else "",
+        f"steerclear {version}" if version else "",
+        "small version (--quick): its intervals are wide" if results.get("quick") else "",
+    ]
+    return " · ".join(str(part) for part in parts if part)
 
 
 def _played(settings: Mapping[str, Any]) -> tuple[str, str]:
@@ -248,15 +229,14 @@ def _played(settings: Mapping[str, Any]) -> tuple[str, str]:
 def _tiles(pairings: Sequence[Summary], separation_m: float) -> list[Tile]:
     """The numbers that matter most, means over all games."""
     hits = f"centres within {separation_m:g} m, per game"
-    chosen = [
+    tiles = []
+    for label, key, note in (
         ("hits with opponents", breach_column("opponent", separation_m), hits),
         ("hits with teammates", breach_column("teammate", separation_m), hits),
         ("captures", "captures", "per game"),
         ("closest distance", "closest_m", "m, mean of the games"),
         ("steps changed", "changed_share", "% of the commands decided"),
-    ]
-    tiles = []
-    for label, key, note in chosen:
+    ):
         off, on = (_overall(pairings, key, state) for state in ("off", "on"))
         tiles.append(Tile(label, None if off is None else number_text(off), number_text(on), note))
     return tiles
@@ -270,15 +250,15 @@ def _overall(pairings: Sequence[Summary], key: str, state: str) -> float | None:
     return sum(value * n for value, n in found) / games if games else None
 
 
-def _plots(results: Mapping[str, Any], separation_m: float) -> list[Plot]:
-    pairings = results["pairings"]
-    hits = "hits with {} per game, centres within " + f"{separation_m:g} m"
-    mates, opponents = (breach_column(kind, separation_m) for kind in ("teammate", "opponent"))
+def _plots(pairings: Sequence[Summary], games: Sequence[Mapping[str, Any]], separation_m: float) -> list[Plot]:
+    hits = "hits with {}s per game, centres within " + f"{separation_m:g} m"
     return [
-        _bars("Hits with opponents", pairings, opponents, hits.format("opponents")),
-        _bars("Hits with teammates", pairings, mates, hits.format("teammates")),
+        *(
+            _bars(f"Hits with {kind}s", pairings, breach_column(kind, separation_m), hits.format(kind))
+            for kind in ("opponent", "teammate")
+        ),
         _bars("Captures", pairings, "captures", "captures per game"),
-        _closest(results["games"], separation_m),
+        _closest(games, separation_m),
         _bars("Steps changed", pairings, "changed_share", "steps changed, %", CHANGED_SHARE_GOAL),
         _reasons(pairings),
     ]
@@ -319,35 +299,30 @@ def _reasons(pairings: Sequence[Summary]) -> Plot:
         if (total := sum(p["reasons"].values()))
     ]
     words = "commands the shield changed, % of all it decided"
-    legend = [(plots.SERIES[k % len(plots.SERIES)], reason_words(name)) for k, name in enumerate(names)]
-    meanings = [(reason_words(name), REASONS[name.lower()]) for name in names if name.lower() in REASONS]
-    figure = plots.shares(groups, words)
-    return Plot("Why commands were changed", Markup(plots.svg(figure, words)), legend, meanings)
-
-
-def reason_words(name: str) -> str:
-    """A reason's name as words."""
-    return name.replace("_", " ").lower().replace("qp", "QP")
+    shown = {name: name.replace("_", " ").lower().replace("qp", "QP") for name in names}
+    legend = [(plots.SERIES[k % len(plots.SERIES)], shown[name]) for k, name in enumerate(names)]
+    meanings = [(shown[name], REASONS[name.lower()]) for name in names if name.lower() in REASONS]
+    return Plot("Why commands were changed", Markup(plots.svg(plots.shares(groups, words), words)), legend, meanings)
 
 
 def _pairing_table(pairing: Summary) -> Table:
-    told = meanings_of(game_metrics_of())
-    columns = {key: head.replace(" - ", " − ") for key, head in columns_of(pairing).items()}
-    covered = pairing.get("games_covered")
+    meanings = {metric.key: metric.meaning for metric in game_metrics_of()}
+    columns, covered = columns_of(pairing), pairing.get("games_covered")
     note = f"{pairing['games_off']} games without, {pairing['games_on']} with the shield; per game [95 % interval]"
-    note += f". {COVERED_WORDS} {covered} games covered." if covered else ""
+    note += f". {COVERED_WORDS} {covered} games covered" if covered else ""
+    if total := sum(pairing["reasons"].values()):
+        parts = [f"{name} {100 * count / total:.2f} %" for name, count in pairing["reasons"].items() if count]
+        note += f". Decisions: {', '.join(parts)} of {total:,} boat-steps"
     rows = [
-        [Cell(figures.get("label", key), told.get(key, "")), *(interval_text(figures.get(part)) for part in columns)]
+        [Cell(figures.get("label", key), meanings.get(key, "")), *(interval_text(figures.get(c)) for c in columns)]
         for key, figures in pairing["metrics"].items()
     ]
-    return Table(pairing["pairing"], ["", *columns.values()], rows, note)
+    return Table(pairing["pairing"], ["", *columns.values()], rows, f"{note}.")
 
 
 def _verdict_table(pairing: Summary) -> Table:
     rows = verdict_rows(pairing.get("verdicts") or {}, interval_text)
-    if not rows:
-        return Table(pairing["pairing"], [], [["Not judged."]], numbers=False)
-    return Table(pairing["pairing"], HEADS, rows, numbers=False)
+    return Table(pairing["pairing"], HEADS if rows else [], rows or [["Not judged."]], numbers=False)
 
 
 def _breaches_table(breaches: Sequence[Mapping[str, Any]]) -> Table:
@@ -356,29 +331,17 @@ def _breaches_table(breaches: Sequence[Mapping[str, Any]]) -> Table:
     rows = []
     for breach in order[:MOST_BREACHES]:
         who = ", ".join(breach["responsible_boats"])
-        rows.append(
-            [
-                f"{breach['pairing']}, {breach['game']}",
-                state_of(breach),
-                number_text(breach["time_s"]),
-                ", ".join(breach["boats"]),
-                number_text(breach["closest_m"]),
-                breach["verdict"].replace("_", " "),
-                number_text(breach["last_preventable_s"]),
-                number_text(breach["other_last_preventable_s"]),
-                (breach["responsible"] or "-") + (f" ({who})" if who else ""),
-            ]
-        )
-    heads = (
-        "game",
-        "shield",
-        "time, s",
-        "boats",
-        "closest, m",
-        "verdict",
-        "last moment, s",
-        "theirs, s",
-        "responsible",
-    )
+        shown = {
+            "game": f"{breach['pairing']}, {breach['game']}",
+            "shield": state_of(breach),
+            "time, s": number_text(breach["time_s"]),
+            "boats": ", ".join(breach["boats"]),
+            "closest, m": number_text(breach["closest_m"]),
+            "verdict": breach["verdict"].replace("_", " "),
+            "last moment, s": number_text(breach["last_preventable_s"]),
+            "theirs, s": number_text(breach["other_last_preventable_s"]),
+            "responsible": (breach["responsible"] or "-") + (f" ({who})" if who else ""),
+        }
+        rows.append(shown)
     more = f"{len(order) - len(rows)} more in results.json." if len(order) > len(rows) else ""
-    return Table("Every judged breach", heads, rows, "", more, True, False)
+    return Table("Every judged breach", list(rows[0]), [list(row.values()) for row in rows], "", more, True, False)

@@ -6,7 +6,6 @@ import json
 import math
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -17,40 +16,20 @@ from steerclear.shield.exceptions import ConfigError
 
 MOST_BYTES = 256 * 2**20
 """Larger JSON files are none of ours."""
-
-
-@dataclass(frozen=True)
-class NewFile:
-    """In an option's ``Annotated``: the command writes that file, and is refused a name that is taken."""
-
-
-NEW = NewFile()
+NEW = "new file"
+"""In an option's ``Annotated``: the command writes that file, and is refused a name that is taken."""
 
 
 def check_new(path: Path | None, option: str) -> None:
-    """Refuse a name that something has already: what a person made, learned or measured is not written over.
-
-    Args:
-        path: the file; None: none is written.
-        option: that names it, for the message.
-
-    Raises:
-        ConfigError: it is there.
-    """
-    if path is None:
-        return
-    if path.is_dir():
+    """Refuse (ConfigError) a name that something has: what a person made, learned or measured is not written over."""
+    if path is not None and path.is_dir():
         raise ConfigError(f"{option} {path} is a folder; name a file in it")
-    if path.exists() or path.is_symlink():
+    if path is not None and (path.exists() or path.is_symlink()):
         raise ConfigError(f"{path} is there already; name another {option}, or remove it")
 
 
 def check_place(path: Path | None, option: str) -> None:
-    """Find out, before hours of work, that a file cannot be written: the nearest folder that is there takes none.
-
-    Raises:
-        ConfigError: it cannot be.
-    """
+    """Find out (ConfigError) before hours of work that the nearest folder that is there takes no file."""
     if path is None:
         return
     try:
@@ -60,20 +39,12 @@ def check_place(path: Path | None, option: str) -> None:
 
 
 def make_folder_of(path: Path) -> None:
-    """Make the folders that a file to be written lies in.
-
-    Raises:
-        OSError: one cannot be made.
-    """
+    """Make the folders that a file to be written lies in; OSError where one cannot be made."""
     path.parent.mkdir(parents=True, exist_ok=True)
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder that results go to.
-
-    Raises:
-        ConfigError: it cannot be made.
-    """
+    """Make a folder that results go to; ConfigError where it cannot be made."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -81,11 +52,7 @@ def make_folder(folder: Path) -> None:
 
 
 def write_new(path: Path, option: str, text: str) -> None:
-    """Write a text file that is not there yet, and the folders it lies in.
-
-    Raises:
-        ConfigError: it cannot be written.
-    """
+    """Write a text file that is not there yet, and the folders it lies in; ConfigError where it cannot be written."""
     try:
         make_folder_of(path)
         path.write_text(text, encoding="utf-8")
@@ -134,16 +101,18 @@ def read_json(path: Path, what: str, remedy: str) -> Any:
     raise ConfigError(f"cannot read {what} from {path} ({words}); {remedy}")
 
 
-def write_json(path: Path, content: Mapping[str, Any]) -> None:
-    """Write JSON that every reader takes: not-a-number becomes null; the file appears whole or not at all.
+def write_json(path: Path | None, content: Mapping[str, Any]) -> None:
+    """Write JSON that every reader takes, where a path is given: not-a-number becomes null; it appears whole or not.
 
     Raises:
         ConfigError: the file cannot be written.
     """
+    if path is None:
+        return
     text = json.dumps(finite(content), indent=2, default=plain_value, allow_nan=False)
     part = path.with_name(f".{path.name}.part")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folder_of(path)
         part.write_text(text + "\n", encoding="utf-8")
         os.replace(part, path)
     except OSError as error:
@@ -156,20 +125,13 @@ def table_name(stem: str = "rows") -> str:
 
 
 def write_table(folder: Path, rows: Sequence[Mapping[str, Any]], stem: str = "rows") -> Path:
-    """Write flat rows as Parquet when pyarrow is installed, else as CSV; return the path.
-
-    Raises:
-        ConfigError: the file cannot be written.
-    """
+    """Write flat rows as Parquet when pyarrow is installed, else as CSV; ConfigError where they cannot be written."""
     import pandas as pd  # takes half a second, which commands without tables do not need
 
     path = folder / table_name(stem)
     table = pd.DataFrame(list(rows)).convert_dtypes()
     try:
-        if path.suffix == ".csv":
-            table.to_csv(path, index=False)
-        else:
-            table.to_parquet(path, index=False)
+        (table.to_csv if path.suffix == ".csv" else table.to_parquet)(path, index=False)
     except OSError as error:
         raise ConfigError(f"cannot write {path} ({error.strerror or error}); choose another place") from error
     return path

@@ -42,12 +42,8 @@ from .provenance import code_digest, machine, versions
 from .result_files import lock_folder, plain_value, told_settings, write_json, write_table
 from .workers import Job, Row, Workers, end_failed, outcomes
 
-EXPERIMENT_FILE, ROWS_FILE, RESULTS_FILE, OLD_ROWS_FILE = (
-    "experiment.json",
-    "rows.jsonl",
-    "results.json",
-    "games.jsonl",
-)
+EXPERIMENT_FILE, ROWS_FILE, RESULTS_FILE = "experiment.json", "rows.jsonl", "results.json"
+OLD_ROWS_FILE = "games.jsonl"
 BESIDE = ("rows.csv", "rows.parquet", "report.html", "replay.html", "entry.html")
 """What commands write into a folder beside those."""
 Notice = Callable[[int, int], None]
@@ -61,16 +57,7 @@ class Interrupted(Exception):
 
 @dataclass(frozen=True)
 class Experiment:
-    """What is run.
-
-    Attributes:
-        command: which command this is.
-        settings: as results keep them.
-        jobs: plain mappings.
-        run: from a job to its rows.
-        unit: what jobs are called, such as ``games``.
-        warm_up: functions that compile what jobs need; each runs once before many processes start.
-    """
+    """What is run: jobs (what ``unit`` calls them) by ``run``; ``warm_up`` compiles before many processes start."""
 
     command: str
     settings: Mapping[str, Any]
@@ -123,11 +110,7 @@ class Run:
         }
 
     def write(self, results: Mapping[str, Any]) -> None:
-        """Write results.json.
-
-        Raises:
-            ConfigError: it cannot be written.
-        """
+        """Write results.json; ConfigError where it cannot be written."""
         write_json(self.folder / RESULTS_FILE, results)
 
     def end(self) -> None:
@@ -183,8 +166,13 @@ def execute(
     before = read_rows(folder / ROWS_FILE)
     kept = {name: before[name] for name in ids if name in before}
     if resume:
-        tell(_words_of_before(folder / ROWS_FILE, len(kept), len(ids), len(before) - len(kept), experiment.unit))
-    _write_head(folder, experiment)
+        words = f"{len(kept)} of {len(ids)} {experiment.unit} are in {folder / ROWS_FILE} and are taken from there"
+        if others := len(before) - len(kept):
+            words += f"; {others} there are of other settings, or of a policy's files before they changed, and count "
+            words += "for nothing here"
+        tell(words)
+    head = {"command": experiment.command, "settings": told_settings(experiment.settings), "jobs": len(experiment.jobs)}
+    write_json(folder / EXPERIMENT_FILE, {**head, "versions": versions(), "code": code_digest()})
     failed, resumed = list[Row](), sum(len(rows) for rows in kept.values())
     missing = [job for name, job in dict(zip(ids, experiment.jobs, strict=True)).items() if name not in kept]
     interrupted = False
@@ -209,11 +197,7 @@ def execute(
 
 
 def open_folder(folder: Path, command: str, resume: bool) -> BaseFileLock:
-    """Make a folder this process's own; what refuses it leaves it as it was.
-
-    Raises:
-        ConfigError: see `execute`.
-    """
+    """Make a folder this process's own; what refuses it (ConfigError, see `execute`) leaves it as it was."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         _check_folder(folder, command, resume)
@@ -264,20 +248,6 @@ def _whose(folder: Path) -> tuple[str | None, str | None]:
     return None, None
 
 
-def _write_head(folder: Path, experiment: Experiment) -> None:
-    settings = told_settings(experiment.settings)
-    head = {"command": experiment.command, "settings": settings, "jobs": len(experiment.jobs)}
-    write_json(folder / EXPERIMENT_FILE, {**head, "versions": versions(), "code": code_digest()})
-
-
-def _words_of_before(path: Path, kept: int, of: int, others: int, unit: str) -> str:
-    words = f"{kept} of {of} {unit} are in {path} and are taken from there"
-    if others:
-        words += f"; {others} there are of other settings, or of a policy's files before they changed, and count for "
-        words += "nothing here"
-    return words
-
-
 def append_row(path: Path, name: str, rows: Sequence[Row]) -> None:
     """Add a finished job; it is on disk when this returns.
 
@@ -303,16 +273,8 @@ def append_row(path: Path, name: str, rows: Sequence[Row]) -> None:
         ) from error
 
 
-def read_rows(path: Path, any_code: bool = False) -> dict[str, list[Row]]:
-    """Rows of every job in a file, by `job_id`; the last line of a job counts.
-
-    Args:
-        path: ``rows.jsonl``.
-        any_code: also lines that other code wrote.
-
-    Raises:
-        ConfigError: the file cannot be read, or is no text.
-    """
+def read_rows(path: Path) -> dict[str, list[Row]]:
+    """Rows of every job in a file, by `job_id`; the last line of a job counts. ConfigError where it is no text."""
     try:
         lines = path.read_bytes().decode().split("\n")
     except (OSError, UnicodeDecodeError) as error:
@@ -323,7 +285,7 @@ def read_rows(path: Path, any_code: bool = False) -> dict[str, list[Row]]:
         entry = read_line(line) if line else None
         if line and entry is None:
             logger.warning("%s line %d is not complete, or not as it was written; it is left out", path, number)
-        elif entry is not None and (any_code or entry["code"] == code_digest()):
+        elif entry is not None and entry["code"] == code_digest():
             found[entry["job"]] = entry["rows"]
         elif entry is not None:
             others += 1

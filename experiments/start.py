@@ -14,14 +14,10 @@ def main() -> None:
     except SystemExit:
         raise
     except BaseException as error:
-        if not _interrupted(error):
+        cause: BaseException | None = error  # Python turns what is raised while a class is made into another
+        while cause is not None and not isinstance(cause, KeyboardInterrupt):
+            cause = cause.__cause__ or cause.__context__
+        if cause is None:
             raise
         sys.stderr.write("interrupted\n")
         sys.exit(130)
-
-
-def _interrupted(error: BaseException | None) -> bool:
-    """Whether an error is Ctrl-C, or was made of it: Python turns what is raised while a class is made into another."""
-    while error is not None and not isinstance(error, KeyboardInterrupt):
-        error = error.__cause__ or error.__context__
-    return error is not None

@@ -10,7 +10,7 @@ number again and again, which is no interval: ratios and differences of counts t
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -43,11 +43,7 @@ NAN = float("nan")
 
 
 def share_interval(successes: int, trials: int) -> Interval:
-    """Wilson score interval of a share; without trials the limits are 0 and 1, and there is no value.
-
-    Raises:
-        ConfigError: negative numbers, or more successes than trials.
-    """
+    """Wilson score interval of a share; without trials the limits are 0 and 1, and there is no value."""
     if not 0 <= successes <= trials:
         raise ConfigError(f"a share needs 0 <= successes <= trials; got {successes} of {trials}")
     if trials == 0:
@@ -75,12 +71,7 @@ def count_interval(events: int, exposure: float = 1.0) -> Interval:
 
 
 def mean_interval(values: ArrayLike, seed: int = 0) -> Interval:
-    """Bootstrap percentile interval of a mean; NaN values are left out, limits are NaN below two values.
-
-    Args:
-        values: one number per game, shape (n,).
-        seed: of the resampling; the same seed gives the same limits.
-    """
+    """Bootstrap percentile interval of a mean; NaN values are left out, limits are NaN below two values."""
     kept = np.asarray(values, dtype=np.float64).ravel()
     kept = kept[~np.isnan(kept)]
     return bootstrap_interval(kept[:, None], lambda rows: rows[..., 0].mean(axis=-1), seed)
@@ -97,11 +88,7 @@ def student_interval(values: ArrayLike) -> Interval:
 
 
 def paired_difference(off: ArrayLike, on: ArrayLike, seed: int = 0) -> Interval:
-    """Bootstrap interval of the mean of ``on - off``, games paired by position (same seeds).
-
-    Raises:
-        ConfigError: the two differ in length, so that they cannot be pairs.
-    """
+    """Bootstrap interval of the mean of ``on - off``, games paired by position (same seeds), equally many."""
     off_values, on_values = _pair(off, on)
     return mean_interval(on_values - off_values, seed)
 
@@ -111,9 +98,6 @@ def paired_ratio(off: ArrayLike, on: ArrayLike, seed: int = 0) -> Interval:
 
     Where one of them never happened, or every resample gives the same ratio, the limits are those of
     `count_ratio_interval`.
-
-    Raises:
-        ConfigError: the two differ in length, so that they cannot be pairs.
     """
     rows = np.column_stack(_pair(off, on))
     if len(rows) == 0:
@@ -130,9 +114,6 @@ def count_ratio_interval(off: int, on: int) -> Interval:
 
     Of all events, those counted ``on`` are a binomial share p, and the ratio is p / (1 - p). With no event on one side
     all of the error probability goes to the limit on the other; with none at all the ratio may be anything.
-
-    Raises:
-        ConfigError: a negative count.
     """
     if min(off, on) < 0:
         raise ConfigError(f"a ratio of counts needs counts >= 0; got {on} over {off}")
@@ -150,9 +131,6 @@ def count_difference(off: ArrayLike, on: ArrayLike, seed: int = 0) -> Interval:
     """Interval of the mean of ``on - off`` of counts, games paired by position.
 
     As `paired_difference`; where the games are all alike, the limits are those that the two rates by themselves leave.
-
-    Raises:
-        ConfigError: the two differ in length, so that they cannot be pairs.
     """
     off_values, on_values = _pair(off, on)
     found = paired_difference(off_values, on_values, seed)
@@ -214,30 +192,23 @@ def figure(table: pd.DataFrame, metric: Metric, seed: int = 0) -> tuple[Interval
     n = len(values)
     if metric.kind == "least":
         return Interval(float(values.min(initial=np.inf)) if n else NAN, NAN, NAN), n
-    if n == 0:
-        return Interval(NAN, NAN, NAN), 0
-    if metric.kind == "count":
-        return count_interval(int(values.sum()), n), n
-    if metric.kind == "share":
-        return share_interval(int(values.sum()), n), n
-    if metric.kind == "mean":
-        return mean_interval(values, seed), n
-    if metric.kind == "percent":
-        return bootstrap_interval(values, _percent_of_totals, seed), n
-    raise ConfigError(f"unknown kind of metric {metric.kind!r}; choose count, share, mean, percent or least")
+    kinds: dict[str, Callable[[], Interval]] = {
+        "count": lambda: count_interval(int(values.sum()), n),
+        "share": lambda: share_interval(int(values.sum()), n),
+        "mean": lambda: mean_interval(values, seed),
+        "percent": lambda: bootstrap_interval(values, _percent, seed),
+    }
+    if metric.kind not in kinds:
+        raise ConfigError(f"unknown kind of metric {metric.kind!r}; choose count, share, mean, percent or least")
+    return (kinds[metric.kind]() if n else Interval(NAN, NAN, NAN)), n
 
 
 def difference(pairs: pd.DataFrame, metric: Metric, seed: int = 0) -> tuple[Interval, int]:
-    """Second less first, rows resampled as pairs.
-
-    Args:
-        pairs: columns of both, with ``_a`` and ``_b`` at the end of their names.
-        metric: of which.
-        seed: of the resampling.
-    """
+    """Second less first of a metric, rows resampled as pairs: columns ``_a`` and ``_b``."""
     if metric.kind == "percent":
         names = [name + end for end in ("_a", "_b") for name in (metric.column, metric.per)]
-        return bootstrap_interval(pairs[names].to_numpy(np.float64), _percent_difference, seed), len(pairs)
+        rows = pairs[names].to_numpy(np.float64)
+        return bootstrap_interval(rows, lambda r: _percent(r[..., 2:]) - _percent(r[..., :2]), seed), len(pairs)
     both = pairs[[metric.column + "_a", metric.column + "_b"]].astype(np.float64).dropna().to_numpy()
     judge = count_difference if metric.kind == "count" else paired_difference
     return judge(both[:, 0], both[:, 1], seed), len(both)
@@ -299,16 +270,8 @@ def _values(table: pd.DataFrame, metric: Metric) -> NDArray[np.float64]:
     return table[metric.column].astype(np.float64).dropna().to_numpy()
 
 
-def _percent_of_totals(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+def _percent(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """First of the totals of two columns, % of the second."""
     totals = rows.sum(axis=-2)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(100.0 * totals[..., 0] / totals[..., 1])
-
-
-def _percent_difference(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    return _percent_of_totals(rows[..., 2:]) - _percent_of_totals(rows[..., :2])
-
-
-def as_figure(interval: Interval, n: int) -> dict[str, Any]:
-    """JSON-ready: value, low, high, n."""
-    return {**asdict(interval), "n": n}

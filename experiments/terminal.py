@@ -7,7 +7,7 @@ import logging
 import sys
 import unicodedata
 from collections.abc import Iterable
-from typing import Any, TextIO
+from typing import Any
 
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
@@ -56,7 +56,8 @@ def prepare() -> None:
     """Make this program's output fit for whatever it goes to: once, when the command starts."""
     codecs.register_error(ERRORS, _replace)
     for stream in (sys.stdout, sys.stderr):
-        _never_fails(stream)
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors=ERRORS)
     if logging.lastResort is not None:
         logging.lastResort.setFormatter(SafeFormatter("%(message)s"))
 
@@ -64,12 +65,6 @@ def prepare() -> None:
 def plain(text: str) -> str:
     """Write a text in ASCII: signs by their meaning, lines of boxes as lines, the rest as question marks."""
     return "".join(letter if letter.isascii() else _plain_letter(letter) for letter in text)
-
-
-def _never_fails(stream: TextIO | None) -> None:
-    reconfigure = getattr(stream, "reconfigure", None)
-    if reconfigure is not None:
-        reconfigure(errors=ERRORS)
 
 
 def _replace(error: UnicodeError) -> tuple[str, int]:

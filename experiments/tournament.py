@@ -33,21 +33,15 @@ KINDS = ("teammate", "opponent")
 
 @dataclass(frozen=True)
 class TournamentSettings:
-    """Settings of a tournament; they are the command line and what results.json keeps.
+    """Settings of a tournament; they are the command line and what results.json keeps; as `MatchSpec`, and.
 
     Attributes:
         teams: policies, each a name or a submission's path.
-        preset: rules of the game.
         states: which teams are shielded: "off", "all", or names with commas; each state plays all games.
         repetitions: times each pair meets on each side.
         seed: repetition r is played from seed + r, in all pairs, on both sides and in all states.
         qualifying: play it.
         finalists: how many teams of the qualifying go on; None for all.
-        penalty: weight of a collision in the score that ranks.
-        judge: "shielded" for the breaches of shielded teams, "all" or "none".
-        shield: settings of the shields.
-        rules: settings of the game that replace the preset's.
-        fixed_start: see `MatchSpec`; as the rest.
 
     Raises:
         ConfigError: fewer than two teams, equal names, an unknown team in a state, or a number out of range.
@@ -168,31 +162,20 @@ def play(
     notice: Notice = lambda done, of: None,
     tell: Callable[[str], None] = lambda words: None,
 ) -> Run:
-    """Play a tournament into a folder, the qualifying first, then the final of those that go on.
-
-    Raises:
-        ConfigError: see `runner.execute`.
-    """
+    """Play a tournament into a folder (see `runner.execute`): the qualifying, then the final of those that go on."""
+    warm = (compile_game, compile_shield, compile_judge)
     first = settings.qualifying_games() if settings.qualifying else settings.final(settings.teams)
-    run = execute(_experiment(settings, first), folder, workers, resume, notice, tell)
+    experiment = Experiment("tournament", asdict(settings), first, play_game, "games", warm)
+    run = execute(experiment, folder, workers, resume, notice, tell)
     if not settings.qualifying or run.interrupted or run.failed:
         return run
     final = settings.final(finalists(seats(run.rows), settings))
-    whole = execute(_experiment(settings, [*first, *final]), folder, workers, True, notice, lambda words: None)
+    whole = execute(replace(experiment, jobs=[*first, *final]), folder, workers, True, notice, lambda words: None)
     return replace(whole, resumed=whole.resumed - len(run.rows) + run.resumed, wall_s=whole.wall_s + run.wall_s)
 
 
-def _experiment(settings: TournamentSettings, jobs: Sequence[Job]) -> Experiment:
-    warm = (compile_game, compile_shield, compile_judge)
-    return Experiment("tournament", asdict(settings), jobs, play_game, "games", warm)
-
-
 def play_game(job: Job) -> list[Row]:
-    """Play a game; its row, as `tournament_keys.TOURNAMENT_GAME` describes it.
-
-    Raises:
-        SteerclearError: a setting or policy is unusable.
-    """
+    """Play a game; its row, ``rows of tournament`` in `docs_keys.KEYS`; SteerclearError where it is unusable."""
     match = Match(MatchSpec.of_job(job))
     try:
         result = match.play()
@@ -214,17 +197,18 @@ def names_of(job: Mapping[str, Any]) -> dict[str, Any]:
 def _counts(match: Match, result: MatchResult, separation_m: float, team: int) -> dict[str, Any]:
     """What a side did, and what its code did."""
     spec, core, seat = match.spec, match.env.core, match.teams[team]
-    shielded = (spec.shield, spec.opponent_shield)[team] is not None
+    shielded = spec.shields[team] is not None
     counts, failures = tally(result.record, team, spec.radii_m), seat.failures()
     breaches = None
     if spec.judge == "all" or shielded:  # the own team's are in the row already
         breaches = result.row["breaches"] if team == spec.own_team else match.breaches(result.record, team)
+    avoidable = [breach["kind"] for breach in breaches or () if breach["verdict"] == "avoidable"]
     times_s = getattr(seat.policy, "think_times_s", None)
     return {
         "shielded": shielded,
         **{name: int(getattr(core, name)[0, team]) for name in ("captures", "grabs", "tags")},
         **{f"hits_{kind}": counts[breach_column(kind, separation_m)] for kind in KINDS},
-        **{f"avoidable_{kind}": _avoidable(breaches, kind) for kind in KINDS},
+        **{f"avoidable_{kind}": None if breaches is None else avoidable.count(kind) for kind in KINDS},
         **{name: counts[name] for name in ("collisions", "closest_m", "changed_share", "deadlocks")},
         "failures": failures.count,
         "usable_steps": failures.usable_steps,
@@ -234,16 +218,10 @@ def _counts(match: Match, result: MatchResult, separation_m: float, team: int) -
     }
 
 
-def _avoidable(breaches: Sequence[Mapping[str, Any]] | None, kind: str) -> int | None:
-    if breaches is None:
-        return None
-    return sum(breach["kind"] == kind and breach["verdict"] == "avoidable" for breach in breaches)
-
-
 def results_of(run: Run, settings: TournamentSettings) -> dict[str, Any]:
-    """The content of results.json; `tournament_keys.TOURNAMENT` describes it."""
+    """The content of results.json; `docs_keys.KEYS` describes it."""
     table = seats(run.rows)
-    final = table[table["phase"] == FINAL] if len(table) else table
+    final, before = (table[table["phase"] == phase] if len(table) else table for phase in (FINAL, QUALIFYING))
     teams, penalty, seed, compared = settings.labels, settings.penalty, settings.seed, compared_states(settings)
     playing = [team for team in teams if len(final) and (final["team"] == team).any()]
     priced = [] if compared is None else prices(final, playing, *compared, seed)
@@ -256,7 +234,7 @@ def results_of(run: Run, settings: TournamentSettings) -> dict[str, Any]:
         "games_resumed": run.resumed,
         "warnings": warnings_of(table),
         "silent": silent_teams(table),
-        "qualifying": qualifying_table(_of_qualifying(table), settings.states, teams, penalty),
+        "qualifying": qualifying_table(before, settings.states, teams, penalty),
         "states": [state_results(final, state, teams, penalty, seed) for state in settings.states],
         "prices": priced,
         "goals": goals,
@@ -265,20 +243,11 @@ def results_of(run: Run, settings: TournamentSettings) -> dict[str, Any]:
     }
 
 
-def _of_qualifying(table: pd.DataFrame) -> pd.DataFrame:
-    return table[table["phase"] == QUALIFYING] if len(table) else table
-
-
 def finalists(table: pd.DataFrame, settings: TournamentSettings) -> tuple[str, ...]:
-    """The teams that go on, as given on the command line: the best of the qualifying in the first state.
-
-    Args:
-        table: `seats` of the qualifying.
-        settings: of the tournament.
-    """
+    """The teams that go on, as given on the command line: the best of the qualifying (`seats`) in the first state."""
     if settings.finalists is None:
         return settings.teams
-    ranked = qualifying_table(_of_qualifying(table), settings.states[:1], settings.labels, settings.penalty)
+    ranked = qualifying_table(table, settings.states[:1], settings.labels, settings.penalty)
     best = {line["team"] for line in ranked[: settings.finalists]}
     return tuple(team for team in settings.teams if label(team) in best)
 

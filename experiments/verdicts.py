@@ -27,11 +27,7 @@ NOT_JUDGED = "not_judged"
 
 
 def check_judge(choice: str) -> str:
-    """Return the choice.
-
-    Raises:
-        ConfigError: none of `JUDGE`.
-    """
+    """Return the choice; ConfigError where it is none of `JUDGE`."""
     if choice not in JUDGE:
         raise ConfigError(f"--judge is {choice!r}; choose one of {', '.join(JUDGE)}")
     return choice
@@ -60,25 +56,18 @@ class StateLog:
     @property
     def driven(self) -> np.ndarray:
         """(T, n) bool."""
-        return self._marks("driven")
+        return np.array(self._rows["driven"], dtype=np.bool_).reshape(-1, len(self._rows["state"][0]))
 
     @property
     def disabled(self) -> np.ndarray:
         """(T, n) bool."""
-        return self._marks("is_disabled")
-
-    def _marks(self, name: str) -> np.ndarray:
-        return np.array(self._rows[name], dtype=np.bool_).reshape(-1, len(self._rows["state"][0]))
+        return np.array(self._rows["is_disabled"], dtype=np.bool_).reshape(-1, len(self._rows["state"][0]))
 
 
 def helpless(verdict: Verdict, disabled: np.ndarray | None) -> bool:
-    """Whether a boat was disabled from the last moment on at which it could have prevented a breach.
+    """Whether a boat was disabled (T, n; None: nobody knows) from the last moment on at which it could have acted.
 
     The oracle steers boats as if each obeyed; and before it was disabled nobody could know that it would be.
-
-    Args:
-        verdict: on the boat.
-        disabled: (T, n) boats that the game had disabled in each step; None: nobody knows.
     """
     if verdict.last_step is None or disabled is None or verdict.last_step >= verdict.step:
         return False
@@ -98,7 +87,7 @@ def judge_game(
         motion: the current that carried the boats, and how late their commands came.
 
     Returns:
-        Per breach, in order of time, the entries that `docs_keys.BREACH` describes.
+        Per breach, in order of time, the entries of ``breaches[]`` in `docs_keys.KEYS`.
     """
     meta = read_meta(record)
     team = np.asarray(meta["team"])
@@ -108,54 +97,39 @@ def judge_game(
     radius_m, dt_s = float(meta["separation_m"]), float(meta["dt_s"])
     verdicts = oracle.judge_breaches(log.states, params, found[:MOST_JUDGED], radius_m, dt_s, log.driven, motion=motion)
     padded: list[BreachVerdict | None] = [*verdicts, *[None] * (len(found) - len(verdicts))]
-    disabled = getattr(log, "disabled", None)
-    return [
-        _entry(row, verdict, meta, team, side, disabled) | {"driven": _is_driven(row, log.driven, team, side)}
-        for row, verdict in zip(found, padded, strict=True)
-    ]
+    disabled, entries = getattr(log, "disabled", None), []
+    for (first, *boats, closest_m), verdict in zip(found, padded, strict=True):
+        step, pair = int(first), [int(boat) for boat in boats]
+        own = [boat for boat in pair if team[boat] == side]
+        entries.append(
+            {
+                "step": step,
+                "time_s": step * dt_s,
+                "boats": [meta["agent_ids"][boat] for boat in pair],
+                "kind": "teammate" if len(own) == 2 else "opponent",
+                "radius_m": radius_m,
+                "closest_m": float(closest_m),
+                **_judged(verdict, own, meta["agent_ids"], disabled),
+                "driven": bool(log.driven[step - 1, own].all()),
+            }
+        )
+    return entries
 
 
-def _is_driven(row: np.ndarray, driven: np.ndarray, team: np.ndarray, side: int) -> bool:
-    """Whether the game drove every own boat of a breach when it began: then no command could prevent it."""
-    step, own = int(row[0]), [boat for boat in (int(row[1]), int(row[2])) if team[boat] == side]
-    return bool(driven[step - 1, own].all())
-
-
-def _entry(
-    row: np.ndarray,
-    verdict: BreachVerdict | None,
-    meta: Mapping[str, Any],
-    team: np.ndarray,
-    side: int,
-    disabled: np.ndarray | None,
+def _judged(
+    both: BreachVerdict | None, own: Sequence[int], agent_ids: Sequence[str], disabled: np.ndarray | None
 ) -> dict[str, Any]:
-    step, pair = int(row[0]), (int(row[1]), int(row[2]))
-    own = [boat for boat in pair if team[boat] == side]
-    entry = {
-        "step": step,
-        "time_s": step * float(meta["dt_s"]),
-        "boats": [meta["agent_ids"][boat] for boat in pair],
-        "kind": "teammate" if len(own) == 2 else "opponent",
-        "radius_m": float(meta["separation_m"]),
-        "closest_m": float(row[3]),
-    }
-    if verdict is None:
+    if both is None:
         empty = ("last_preventable_s", "other_last_preventable_s", "exhausted", "responsible")
-        return {**entry, "verdict": NOT_JUDGED, **dict.fromkeys(empty), "responsible_boats": []}
-    judged = _judged(verdict, own, meta["agent_ids"])
-    could = [verdict.of(boat) for boat in own if verdict.of(boat).outcome is Outcome.AVOIDABLE]
-    if could and all(helpless(one, disabled) for one in could):
-        judged |= {"verdict": Outcome.UNAVOIDABLE.value, "last_preventable_s": None}
-    return {**entry, **judged}
-
-
-def _judged(both: BreachVerdict, own: Sequence[int], agent_ids: Sequence[str]) -> dict[str, Any]:
+        return {"verdict": NOT_JUDGED, **dict.fromkeys(empty), "responsible_boats": []}
     ours = [both.of(boat) for boat in own]
     best = max(ours, key=lambda verdict: -1 if verdict.last_step is None else verdict.last_step)
     theirs = [verdict.last_preventable_s for verdict in (both.first, both.second) if verdict.own not in own]
+    could = [verdict for verdict in ours if verdict.outcome is Outcome.AVOIDABLE]
+    nobody = bool(could) and all(helpless(verdict, disabled) for verdict in could)
     return {
-        "verdict": best.outcome.value,
-        "last_preventable_s": best.last_preventable_s,
+        "verdict": Outcome.UNAVOIDABLE.value if nobody else best.outcome.value,
+        "last_preventable_s": None if nobody else best.last_preventable_s,
         "other_last_preventable_s": theirs[0] if theirs else None,
         "exhausted": all(verdict.exhausted for verdict in ours),
         "responsible": _side(both, own),
@@ -171,50 +145,34 @@ def _side(both: BreachVerdict, own: Sequence[int]) -> str:
     return "own" if all(inside) else "both" if any(inside) else "opponent"
 
 
-OUTCOMES = tuple(outcome.value for outcome in Outcome)
 AVOIDABLE = Outcome.AVOIDABLE.value
-
-
 Row = Mapping[str, Any]
-KINDS = (("teammate", "teammate"), ("opponent", "opponent"))
+KINDS = ("teammate", "opponent")
 SIDES = ("own", "opponent", "both", "game", "neither", "start")
 OFF, ON, COVERED = STATES = ("off", "on", "covered")
 """States of the shield; covered, where it is played beside on: also for boats that the game drives."""
-_COUNTED = (*OUTCOMES, NOT_JUDGED)
+_COUNTED = (*(outcome.value for outcome in Outcome), NOT_JUDGED)
 HEADS = ("", "breaches", "avoidable", "unavoidable", "started inside", "not judged", "avoidable per game")
 SHORT_HEADS = ("", "breaches", "avoid.", "unavoid.", "inside", "unjudged", "avoidable/game")
 
 
-def verdict_column(verdict: str, kind: str, radius_m: float) -> str:
-    """Name the column of a count: `avoidable_opponent_2.5m`."""
-    return f"{verdict}_{kind}_{float(radius_m)}m"
-
-
 def verdict_columns(breaches: Sequence[Row] | None, radius_m: float) -> dict[str, int | None]:
-    """Count a game's verdicts per kind of pair.
-
-    Args:
-        breaches: as `judge_game` returns them; None when the game was not judged.
-        radius_m: at which they were.
+    """Count a game's verdicts (of `judge_game`; None: it was not judged, and neither is any column).
 
     Returns:
         ``avoidable`` of both kinds, of them ``avoidable_driven`` of boats that the game drove, and a count per outcome
-        and kind; None in all when the game was not judged.
+        and kind, such as ``avoidable_opponent_2.5m``.
     """
-    found = None if breaches is None else [breach for breach in breaches if breach["verdict"] == AVOIDABLE]
-    driven = None if found is None else sum(bool(breach.get("driven")) for breach in found)
-    return {"avoidable": None if found is None else len(found), "avoidable_driven": driven} | {
-        verdict_column(verdict, kind, radius_m): None if breaches is None else _number(breaches, kind, verdict)
-        for kind, _ in KINDS
-        for verdict in _COUNTED
-    }
+    found = [breach for breach in breaches or () if breach["verdict"] == AVOIDABLE]
+    counts = {"avoidable": len(found), "avoidable_driven": sum(bool(breach.get("driven")) for breach in found)}
+    for kind in KINDS:
+        for verdict in _COUNTED:
+            counts[f"{verdict}_{kind}_{float(radius_m)}m"] = _number(breaches or (), kind, verdict)
+    return {name: None if breaches is None else count for name, count in counts.items()}
 
 
 def summarise_verdicts(rows: Sequence[Row]) -> dict[str, Any]:
-    """Summarise the verdicts of a pairing's games.
-
-    Args:
-        rows: games; those without ``breaches`` (stored by an earlier version, or not asked for) were not judged.
+    """Summarise the verdicts of a pairing's games; those without ``breaches`` were not judged.
 
     Returns:
         Per shield state off, on and, where there are such games, covered: ``games`` and ``games_judged``; per kind the
@@ -228,7 +186,7 @@ def summarise_verdicts(rows: Sequence[Row]) -> dict[str, Any]:
             continue
         judged = [row["breaches"] for row in games if row.get("breaches") is not None]
         found = [breach for breaches in judged for breach in breaches]
-        kinds = {kind: _kind(found, kind, len(judged)) for kind, _ in KINDS}
+        kinds = {kind: _kind(found, kind, len(judged)) for kind in KINDS}
         summary[state] = {"games": len(games), "games_judged": len(judged), **kinds}
     return summary
 
@@ -264,28 +222,15 @@ def all_breaches(rows: Sequence[Row]) -> list[dict[str, Any]]:
 
 
 def verdict_rows(verdicts: Mapping[str, Any], interval_text: Any) -> list[list[str]]:
-    """Lay out a summary of verdicts, a line per shield state and kind, under `HEADS`.
-
-    There are none where no game was judged.
-
-    Args:
-        verdicts: as `summarise_verdicts` returns them; empty for results of an earlier version.
-        interval_text: writes a figure.
-    """
-    lines: list[list[str]] = []
-    if not any((verdicts.get(state) or {}).get("games_judged") for state in STATES):
-        return lines
-    for state in STATES:
-        part = verdicts.get(state) or {}
-        if part.get("games"):
-            lines += [_line(state, part, kind, words, interval_text) for kind, words in KINDS]
+    """Lay out `summarise_verdicts`, a line per shield state and kind, under `HEADS`; none where no game was judged."""
+    parts = [(state, part) for state in STATES if (part := verdicts.get(state) or {}).get("games")]
+    lines = []
+    for state, part in parts if any(part["games_judged"] for _, part in parts) else ():
+        for kind in KINDS:
+            told = ["not judged", *["-"] * (len(HEADS) - 2)]
+            if part["games_judged"]:
+                counts = part[kind]
+                told = [str(counts[name]) for name in ("breaches", *_COUNTED)]
+                told.append(interval_text(counts["avoidable_per_game"]))
+            lines.append([f"{kind}, {state}", *told])
     return lines
-
-
-def _line(state: str, part: Mapping[str, Any], kind: str, words: str, interval_text: Any) -> list[str]:
-    label = f"{words}, {state}"
-    if not part["games_judged"]:
-        return [label, "not judged", *["-"] * (len(HEADS) - 2)]
-    counts = part[kind]
-    numbers = [str(counts[name]) for name in ("breaches", *_COUNTED)]
-    return [label, *numbers, interval_text(counts["avoidable_per_game"])]

@@ -63,12 +63,7 @@ PARTS: dict[str, Callable[[], object]] = {
 
 
 def compile_share(number: int, of: int) -> None:
-    """Compile everything beside ``of - 1`` other processes that do so: each begins elsewhere and waits for the others.
-
-    Args:
-        number: which of them this one is, from 0.
-        of: how many there are.
-    """
+    """Compile everything, the ``number``-th (from 0) ``of`` processes that do: each begins elsewhere."""
     parts = list(PARTS.values())
     first = number * len(parts) // of
     for compile_it in parts[first:] + parts[:first]:

@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import multiprocessing
 import multiprocessing.connection
 import os
 import signal
+import sys
+import tempfile
 import threading
+import traceback
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from importlib.util import find_spec
 from typing import Any, NoReturn
 
 from steerclear.shield.exceptions import ConfigError, SteerclearError
 from steerclear.shield.extras import install_command
 
-from .faults import machine_words, name_of, trace_of, words_of_trace
-from .provenance import available_cores, code_digest
+from .provenance import available_cores, code_digest, package_version
 
 Job = Mapping[str, Any]
 Row = dict[str, Any]
@@ -31,6 +35,22 @@ MOST_JOBS = 1024
 TRIES = 4
 """Times a job is begun anew on a cluster when its node or worker is lost."""
 DIED = "its worker process died, also when it ran alone (out of memory?); mend that, then --resume"
+_ELSEWHERE, _RIGHTS = "free some space, or write elsewhere", "give yourself the right to it, or name another place"
+MACHINE = {
+    errno.ENOSPC: _ELSEWHERE,
+    errno.EDQUOT: _ELSEWHERE,
+    errno.EROFS: "write elsewhere",
+    errno.EACCES: _RIGHTS,
+    errno.EPERM: _RIGHTS,
+    errno.ENOENT: "name a place that is there",
+    errno.ENOTDIR: "name another place",
+    errno.EISDIR: "name a file",
+    errno.ENAMETOOLONG: "give a shorter name",
+    errno.EMFILE: "raise the limit on open files (ulimit -n)",
+    errno.ENFILE: "close other programs",
+    errno.EIO: "look after that disk",
+}
+"""What a machine may refuse, with what helps."""
 _ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
 
 
@@ -39,33 +59,60 @@ class JobFault(Exception):
 
 
 def end_failed(failed: Sequence[Mapping[str, Any]], what: str, remedy: str) -> NoReturn:
-    """End a run of which jobs gave no answer.
-
-    Args:
-        failed: of each, among others, ``error`` and ``fault``.
-        what: of the jobs, with their number, such as "3 games could not be played".
-        remedy: where nothing is wrong with steerclear.
+    """End a run of which jobs gave no answer, each with ``error`` and ``fault``.
 
     Raises:
         JobFault: one of them is a fault of steerclear.
-        ConfigError: none is.
+        ConfigError: none is; its text is ``what`` ("3 games could not be played") and the ``remedy``.
     """
-    faults = [entry["error"] for entry in failed if entry["fault"]]
-    if faults:
-        raise JobFault(f"{what}: {faults[0]}")
+    for entry in failed:
+        if entry["fault"]:
+            raise JobFault(f"{what}: {entry['error']}")
     raise ConfigError(f"{what}{remedy}")
+
+
+def machine_words(error: Exception) -> str:
+    """Words for what the machine refused; empty when the error is none of its own."""
+    if isinstance(error, MemoryError):
+        return "there is not enough memory; do less at once (fewer --jobs, shorter games), or give it more"
+    if isinstance(error, OSError) and error.errno in MACHINE:
+        place = f" ({error.filename})" if error.filename else ""
+        return f"{error.strerror}{place}; {MACHINE[error.errno]}"
+    return ""
+
+
+def fault_words(error: Exception) -> str:
+    """One line that says this is a fault of steerclear, and where its traceback was written."""
+    return _words_of_trace(_name_of(error), _trace_of(error))
+
+
+def _name_of(error: Exception) -> str:
+    """What an error says, on one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split())[:200]
+
+
+def _trace_of(error: Exception) -> str:
+    """Its traceback as text, which goes from process to process."""
+    return "".join(traceback.format_exception(error))
+
+
+@lru_cache(maxsize=64)  # one file for all jobs that end in the same
+def _words_of_trace(name: str, trace: str) -> str:
+    lines = [trace, f"steerclear {package_version()}, Python {sys.version}", f"command: {sys.argv!r}"]
+    try:
+        with tempfile.NamedTemporaryFile(
+            "w", prefix="steerclear-fault-", suffix=".txt", delete=False, encoding="utf-8", errors="backslashreplace"
+        ) as file:
+            file.write("\n".join(lines))
+        kept = f"its traceback is in {file.name}: please report it"
+    except OSError as problem:
+        kept = f"its traceback could not be written ({problem.strerror})"
+    return f"this is a fault of steerclear, not of yours ({name}); {kept}"
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one job.
-
-    Attributes:
-        job: which.
-        answer: its answer; None: it has none.
-        error: why, on one line.
-        trace: traceback of what no one foresaw, a fault of steerclear; None for bad input and the machine's doing.
-    """
+    """What became of a job: an answer, or why there is none; ``trace``: of what no one foresaw, steerclear's fault."""
 
     job: Any
     answer: Any
@@ -80,12 +127,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Ray:
-    """A Ray cluster; what a lost node had under way runs again elsewhere.
-
-    Attributes:
-        processes: jobs at once where Ray is started here.
-        address: of a running cluster, such as ``auto`` or ``10.0.0.1:6379``; None starts Ray on this machine.
-    """
+    """A Ray cluster at an address (``auto``, ``10.0.0.1:6379``); None starts Ray here, for so many jobs at once."""
 
     processes: int = 1
     address: str | None = None
@@ -96,11 +138,7 @@ Workers = int | Ray
 
 
 def workers_of(engine: str, address: str | None, jobs: int | None) -> Workers:
-    """What ``--engine``, ``--address`` and ``--jobs`` ask for.
-
-    Raises:
-        ConfigError: an unknown engine, an address without Ray, Ray missing, or an unusable number of jobs.
-    """
+    """What ``--engine``, ``--address`` and ``--jobs`` ask for; ConfigError where they do not go together."""
     if engine not in ENGINES:
         raise ConfigError(f"unknown engine {engine!r}; choose one of {', '.join(ENGINES)}")
     processes = processes_of(jobs)
@@ -115,11 +153,7 @@ def workers_of(engine: str, address: str | None, jobs: int | None) -> Workers:
 
 
 def processes_of(jobs: int | None) -> int:
-    """How many processes ``--jobs`` asks for; all cores when it is not given.
-
-    Raises:
-        ConfigError: less than one, or more than `MOST_JOBS`.
-    """
+    """How many processes ``--jobs`` asks for, all cores without it; ConfigError beyond 1 to `MOST_JOBS`."""
     if jobs is not None and not 1 <= jobs <= MOST_JOBS:
         raise ConfigError(
             f"--jobs must be at least 1 and at most {MOST_JOBS:,}; got {jobs:,}; leave it out to use all cores"
@@ -152,7 +186,7 @@ def outcomes(
         found = _in_pool(function, jobs, workers)
     for outcome in found:
         if outcome.trace is not None:
-            outcome = replace(outcome, error=words_of_trace(outcome.error or "", outcome.trace))
+            outcome = replace(outcome, error=_words_of_trace(outcome.error or "", outcome.trace))
         yield outcome
 
 
@@ -169,20 +203,17 @@ def attempt(function: Function, job: Any) -> Outcome:
         return Outcome(job, None, str(error))
     except Exception as error:
         words = machine_words(error)
-        return Outcome(job, None, words or name_of(error), None if words else trace_of(error))
+        return Outcome(job, None, words or _name_of(error), None if words else _trace_of(error))
 
 
 def _in_pool(function: Function, jobs: Sequence[Any], processes: int) -> Iterator[Outcome]:
     """Run in processes; a job whose process dies runs again alone, so that the one that kills it is known."""
-    waiting, suspects = deque(jobs), deque[Any]()
-    while waiting:
-        with _pool(min(processes, len(waiting))) as pool:
-            yield from _until_broken(pool, function, waiting, suspects, processes)
-    while suspects:
-        alone = deque[Any]()
-        with _pool(1) as pool:
-            yield from _until_broken(pool, function, suspects, alone, 1)
-        yield from (Outcome(job, None, DIED) for job in alone)
+    waiting, suspects, alone = deque(jobs), deque[Any](), deque[Any]()
+    for left, lost, at_once in ((waiting, suspects, processes), (suspects, alone, 1)):
+        while left:
+            with _pool(min(at_once, len(left))) as pool:
+                yield from _until_broken(pool, function, left, lost, at_once)
+    yield from (Outcome(job, None, DIED) for job in alone)
 
 
 def _until_broken(
@@ -232,15 +263,13 @@ def _pool(processes: int) -> Iterator[ProcessPoolExecutor]:
 def _begin_worker() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; only the parent answers
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    threading.Thread(target=_end_with_parent, name="parent", daemon=True).start()
+    if (parent := multiprocessing.parent_process()) is not None:
 
+        def end_with_parent() -> None:
+            multiprocessing.connection.wait([parent.sentinel])
+            os._exit(1)
 
-def _end_with_parent() -> None:
-    """End this worker when the process that started it is gone, however it ended."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        multiprocessing.connection.wait([parent.sentinel])
-        os._exit(1)
+        threading.Thread(target=end_with_parent, name="parent", daemon=True).start()
 
 
 @contextlib.contextmanager

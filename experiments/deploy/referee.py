@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 from steerclear.shield.bridge.clock import Clock
 from steerclear.shield.bridge.feed import FeedReceiver, FeedSender, GameState
 from steerclear.shield.bridge.fleet_file import FleetFile
-from steerclear.shield.bridge.links import LINK_MAKERS, key_of
 from steerclear.shield.bridge.messages import Contact, Link, LinkMaker, contact_of
+from steerclear.shield.bridge.session import LINK_MAKERS, key_of
 from steerclear.shield.compat import Self
 from steerclear.shield.exceptions import FleetFileError
 

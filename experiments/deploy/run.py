@@ -14,16 +14,13 @@ from dataclasses import dataclass
 from functools import cache, partial
 
 from steerclear.policies.registry import SB3_PREFIX
-from steerclear.shield.bridge.autopilot_fence import check_fence
 from steerclear.shield.bridge.blackbox import McapWriter, check_disk, header_of_fleet, log_path
 from steerclear.shield.bridge.clock import Clock, MonotonicClock
 from steerclear.shield.bridge.control_loop import ControlLoop, Timing
 from steerclear.shield.bridge.drill import Drill, Missed, drill_checks
-from steerclear.shield.bridge.feed import FeedSender
-from steerclear.shield.bridge.feed_sender import PositionPublisher
+from steerclear.shield.bridge.feed import FeedSender, PositionPublisher
 from steerclear.shield.bridge.fleet_file import FleetFile
-from steerclear.shield.bridge.link_checks import link_checks
-from steerclear.shield.bridge.links import key_of
+from steerclear.shield.bridge.link_checks import check_fence, link_checks
 from steerclear.shield.bridge.mavlink.vehicle import MavlinkLink
 from steerclear.shield.bridge.messages import TickSink, WantedSource
 from steerclear.shield.bridge.moos.checks import moos_checks
@@ -40,7 +37,7 @@ from steerclear.shield.bridge.preflight_checks import (
     run_checks,
     validate_accepted,
 )
-from steerclear.shield.bridge.session import VehicleSession
+from steerclear.shield.bridge.session import VehicleSession, key_of
 from steerclear.shield.bridge.tracker import Tracker
 
 from .orders import LONGEST_MINUTES, Orders, Outcome, Surface, read_fleet, refuse_early

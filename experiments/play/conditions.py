@@ -72,20 +72,13 @@ class Conditions:
 
     def shield_settings(self, dt_s: float) -> dict[str, float]:
         """What a shield is told of them, as settings; nothing where there is nothing to tell."""
-        told = {
-            "delay_s": self.delay_steps(dt_s) * dt_s,
-            "position_error_m": self.noise_m,
-            "current_mps": self.current_mps,
-        }
+        delay_s = self.delay_steps(dt_s) * dt_s
+        told = {"delay_s": delay_s, "position_error_m": self.noise_m, "current_mps": self.current_mps}
         return {name: value for name, value in told.items() if value > 0.0}
 
 
 def check_values(values: Mapping[str, Any], most: Mapping[str, float]) -> None:
-    """Refuse what is no number from 0 to its most.
-
-    Raises:
-        ConfigError: names the first.
-    """
+    """Refuse (ConfigError, which names the first) what is no number from 0 to its most."""
     for name, value in values.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= most[name]:
             raise ConfigError(f"{name} is {value!r}; give a number from 0 to {most[name]:g}")
@@ -149,16 +142,10 @@ _TAG = crc32(b"conditions")
 
 
 class Disturbances:
-    """Delay, position errors and current of one game.
+    """Delay (of the own team's commands), position errors and current of one game, drawn from its seed.
 
     Where the boats drift is decided before they move in a step, so that the rules (edges, tags, flags) see them where
     they then are: a boat that the current carries over an edge is out of bounds.
-
-    Args:
-        env: the game.
-        conditions: what there is of each.
-        seed: of the game; the same seed draws the same current and the same errors, with a shield or without.
-        own_team: whose commands come late.
 
     Raises:
         ConfigError: the current outruns boats that the game drives back into the field.
@@ -200,26 +187,24 @@ class Disturbances:
         self._waiting = deque([held] * self._steps)
 
     def carry(self, core: BatchedMctf, commands: Array) -> Array:
-        """Let the boats drift for a step; the commands (1, n, 2) that take effect now, when these are sent."""
-        arrived = self._arrived(core, commands)
+        """Let the boats drift for a step; the commands (1, n, 2) that take effect now, when these are sent.
+
+        Own ones are the compass courses they were given for.
+        """
+        if self._waiting:
+            own, heading_deg = self._own, core.state[0, self._own, L.HEADING]
+            self._waiting.append(absolute_commands(commands[0, own], heading_deg))
+            late, commands = self._waiting.popleft(), commands.copy()
+            # headings as the game takes them, relative, in [-180, 180)
+            commands[0, own] = np.column_stack([late[:, 0], (late[:, 1] - heading_deg + 180.0) % 360.0 - 180.0])
         core.state[:, :, [L.X, L.Y]] += self.current_mps * self._dt_s
-        return arrived
+        return commands
 
     def look(self, core: BatchedMctf) -> None:
         """Move the errors on by a step; call it before anything reads the game."""
         bound_m = self._conditions.noise_m
         observe(core.state, self._error, self._seeds, bound_m, self._first, self._dt_s, self._seen)
         self._first = False
-
-    def _arrived(self, core: BatchedMctf, sent: Array) -> Array:
-        """Commands (1, n, 2) that take effect now, own ones as the compass courses they were given for."""
-        if not self._waiting:
-            return sent
-        own, heading_deg = self._own, core.state[0, self._own, L.HEADING]
-        self._waiting.append(absolute_commands(sent[0, own], heading_deg))
-        arrived = sent.copy()
-        arrived[0, own] = _relative(self._waiting.popleft(), heading_deg)
-        return arrived
 
 
 class _Reader(MctfReader):
@@ -235,21 +220,10 @@ class _Reader(MctfReader):
 
 
 def check_current(conditions: Conditions, config: GameConfig) -> None:
-    """Refuse a current that no boat comes back against.
-
-    Raises:
-        ConfigError: the game drives some boat that is out of bounds no faster than the current.
-    """
+    """Refuse (ConfigError) a current that some boat out of bounds does not come back against."""
     slowest_mps = config.oob_speed_frac * min(platform.max_speed_mps for platform in config.platforms)
     if conditions.current_mps > 0.0 and not conditions.current_mps < slowest_mps:
         raise ConfigError(
             f"current_mps is {conditions.current_mps:g}, but boats out of bounds are driven back at {slowest_mps:g} "
             f"m/s; give less than that, or a higher oob_speed_frac (it is {config.oob_speed_frac:g})"
         )
-
-
-def _relative(commands: Array, heading_deg: Array) -> Array:
-    """Commands (n, 2) of speed m/s and absolute heading deg as the game takes them, headings in [-180, 180)."""
-    relative = np.array(commands)
-    relative[:, 1] = (commands[:, 1] - heading_deg + 180.0) % 360.0 - 180.0
-    return relative

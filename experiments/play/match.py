@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,8 +21,9 @@ from steerclear.shield.platforms import layout as L
 from ..entries.team import make_team
 from ..game_metrics import driven_breaches, reason_counts, scores, tally
 from ..verdicts import StateLog, judge_game, verdict_columns
+from ..workers import Workers, outcomes
 from .openings import opening
-from .policy_runner import Failures, PolicyRunner
+from .policy_runner import PolicyRunner
 from .recorder import PlayingEnv, Recorder, live_view, read_infos
 from .shielding import Seen, Shielding, shield_game
 from .spec import SIDES, MatchSpec
@@ -37,7 +38,7 @@ class MatchResult:
 
     Attributes:
         spec: what was to be played.
-        row: flat columns, as `metrics.GAME_COLUMNS` and `metrics.game_metrics_of` describe them.
+        row: flat columns, as ``rows of ablate`` in `docs_keys.KEYS` describes them.
         record: everything that happened, see `steerclear.env.record`.
     """
 
@@ -63,46 +64,62 @@ class Match:
         self.speedup = speedup
         self.env = PlayingEnv(spec.config(), render_mode=render_mode)
         self.shielding: Shielding = shield_game(self.env, spec)
-        ids = self.env.possible_agents
-        size = self.env.config.team_size
         names = [spec.own, spec.opponent] if spec.side == "blue" else [spec.opponent, spec.own]
         self.names = dict(zip(SIDES, names, strict=True))
-        self.teams = [
-            PolicyRunner(team, self.env, ids[k * size : (k + 1) * size]) for k, team in enumerate(_teams(spec, names))
-        ]
+        with contextlib.ExitStack() as stack:  # a policy that cannot be built leaves none open
+            policies = []
+            for name in names:
+                policies.append(make_team(name, spec.game, spec.trust, spec.answer_s))
+                if hasattr(policies[-1], "close"):
+                    stack.callback(policies[-1].close)
+            stack.pop_all()
+        self.teams = [PolicyRunner(policy, self.env, self._boats_of(team)) for team, policy in enumerate(policies)]
         self._recorder: Recorder | None = None
         self._log = StateLog() if spec.judged else None
         self._driven: list[NDArray[np.bool_]] = []
         self._decision_us: list[float] = []
         self._moment: tuple[Array, Array, Seen] | None = None
 
-    def play(self, watcher: Watcher | None = None) -> MatchResult:
-        """Play to the end.
+    def _boats_of(self, team: int) -> list[str]:
+        size = self.env.config.team_size
+        return self.env.possible_agents[team * size : (team + 1) * size]
 
-        Args:
-            watcher: called after every step.
-        """
+    def play(self, watcher: Watcher | None = None) -> MatchResult:
+        """Play to the end; the watcher is called after every step."""
         started = time.perf_counter()
         observations, infos = self._start()
         while self.env.agents:
             actions = self.teams[0].act(observations, infos) | self.teams[1].act(observations, infos)
-            observations, _, _, _, infos = self._step(actions)
+            try:
+                observations, _, _, _, infos = self.shielding.step(actions)
+            except GameError:  # an answer the game refuses; nothing has moved yet
+                self._moment = None
+                mended = self.teams[0].mended(actions) | self.teams[1].mended(actions)
+                observations, _, _, _, infos = self.shielding.step(mended)
             self._record_step()
             if watcher is not None and not watcher(self.env):
                 break
-        return self._result(time.perf_counter() - started)
+        assert self._recorder is not None  # _start() made it
+        record = self._recorder.finish()
+        record = {**record, "breaches": find_breaches(record["position"], self.shielding.separation_m)}
+        return MatchResult(self.spec, self._row(record, time.perf_counter() - started), record)
 
     def seat(self, team: int, policy: Any) -> None:
         """Let a policy object play a team, 0 blue or 1 red, in place of the named one; before the game begins."""
-        size = self.env.config.team_size
         self.teams[team].close()
-        self.teams[team] = PolicyRunner(policy, self.env, self.env.possible_agents[team * size : (team + 1) * size])
+        self.teams[team] = PolicyRunner(policy, self.env, self._boats_of(team))
 
     def close(self) -> None:
         """Close the window and let the policies give back what they hold."""
         for team in self.teams:
             team.close()
         self.env.close()
+
+    def breaches(self, record: Record, team: int) -> list[dict[str, Any]] | None:
+        """Judge the breaches of a team, 0 blue or 1 red, of the game just played; None where none are judged."""
+        if self._log is None:
+            return None
+        return judge_game(self._log, self.env.core.params, record, team, self.shielding.motion)
 
     def _start(self) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
         spec = self.spec
@@ -112,7 +129,16 @@ class Match:
         self.shielding.listen(self._note_commands)
         for number, team in enumerate(self.teams):
             team.reset(self.shielding.env, 2 * spec.seed + number)
-        meta = self._meta()
+        conditions = spec.conditions.words
+        meta = meta_of(
+            self.env.config,
+            separation_m=self.shielding.separation_m,
+            policies=self.names,
+            shielded=self.shielding.agent_ids,
+            seed=spec.seed,
+            reason_names=self.shielding.reason_names,
+            title=f"{self.names['blue']} – {self.names['red']}, {conditions}" if conditions else "",
+        )
         self._recorder = Recorder(live_view(self.env.core), meta)
         if self._log is not None:
             self._log.start(self.env.core)
@@ -123,35 +149,9 @@ class Match:
             self.env.renderer.speedup = self.speedup
         return answer
 
-    def _step(self, actions: dict[str, Any]) -> tuple[Any, ...]:
-        try:
-            return self.shielding.step(actions)
-        except GameError:  # an answer the game refuses; nothing has moved yet
-            self._moment = None
-            mended = self.teams[0].mended(actions) | self.teams[1].mended(actions)
-            return self.shielding.step(mended)
-
-    def _meta(self) -> dict[str, Any]:
-        return meta_of(
-            self.env.config,
-            separation_m=self.shielding.separation_m,
-            policies=self.names,
-            shielded=self.shielding.agent_ids,
-            seed=self.spec.seed,
-            reason_names=self.shielding.reason_names,
-            title=self._title(),
-        )
-
     def _steered(self) -> frozenset[str]:
         """Boats that a human steers: the first of a team whose policy is the keyboard."""
-        size = self.env.config.team_size
-        first = zip(self.names.values(), self.env.possible_agents[::size], strict=True)
-        return frozenset(agent for name, agent in first if name == KEYBOARD)
-
-    def _title(self) -> str:
-        """Who plays, under which conditions; the usual title where there are none."""
-        conditions = self.spec.conditions.words
-        return f"{self.names['blue']} – {self.names['red']}, {conditions}" if conditions else ""
+        return frozenset(self._boats_of(k)[0] for k, name in enumerate(self.names.values()) if name == KEYBOARD)
 
     def _note_commands(self, wanted: Array, sent: Array) -> None:
         if self._moment is not None:  # an earlier step of motion of the same decision is over
@@ -177,30 +177,20 @@ class Match:
             self._decision_us.append(1e6 * seen.solve_time_s)
         self._moment = None
 
-    def _result(self, wall_s: float) -> MatchResult:
-        assert self._recorder is not None  # _start() made it
-        record = self._recorder.finish()
-        record = {**record, "breaches": find_breaches(record["position"], self.shielding.separation_m)}
-        return MatchResult(self.spec, self._row(record, wall_s), record)
-
     def _row(self, record: Record, wall_s: float) -> dict[str, Any]:
-        spec = self.spec
-        counts = {**self._events(), **tally(record, spec.own_team, spec.radii_m)}
-        counts |= driven_breaches(record, np.array(self._driven), spec.own_team, spec.radii_m)
-        own, opponent = (self.teams[k].failures() for k in (spec.own_team, 1 - spec.own_team))
-        return {
-            **self._header(record),
-            **counts,
-            **scores(counts, spec.penalty),
-            **self._decision_columns(),
-            **{f"reason_{name}": count for name, count in reason_counts(record, spec.own_team).items()},
-            **_failure_columns(own, opponent),
-            **self._verdict_columns(record),
-            "wall_s": wall_s,
+        spec, core, steps, own = self.spec, self.env.core, len(record["wanted"]), self.spec.own_team
+        counts: dict[str, Any] = {
+            name + suffix: int(getattr(core, name)[0, team])
+            for name in ("captures", "grabs", "tags")
+            for suffix, team in (("", own), ("_against", 1 - own))
         }
-
-    def _header(self, record: Record) -> dict[str, Any]:
-        spec, steps = self.spec, len(record["wanted"])
+        counts |= tally(record, own, spec.radii_m)
+        counts |= driven_breaches(record, np.array(self._driven), own, spec.radii_m)
+        timed = self._decision_us[1:]  # the first one loads compiled code
+        quantiles = np.quantile(timed, [0.5, 0.99, 1.0]).tolist() if timed else [None] * 3
+        failed = [self.teams[team].failures() for team in (own, 1 - own)]
+        texts = [f"{who}: {text}" for who, one in zip(("own", "opponent"), failed, strict=True) for text in one.texts]
+        breaches = self.breaches(record, own)
         return {
             "pairing": spec.pairing,
             "game": spec.game,
@@ -210,44 +200,19 @@ class Match:
             **dict(zip(("own_files", "opponent_files"), spec.files, strict=True)),
             "steps": steps,
             "duration_s": steps * self.env.config.dt_s,
+            **counts,
+            **scores(counts, spec.penalty),
+            **dict(zip(("decision_p50_us", "decision_p99_us", "decision_max_us"), quantiles, strict=True)),
+            **{f"reason_{name}": count for name, count in reason_counts(record, own).items()},
+            "policy_failures": failed[0].count,
+            "opponent_policy_failures": failed[1].count,
+            "policy_usable_steps": failed[0].usable_steps,
+            "opponent_policy_usable_steps": failed[1].usable_steps,
+            "first_failure": texts[0] if texts else None,
+            **verdict_columns(breaches, self.shielding.separation_m),
+            "breaches": breaches,
+            "wall_s": wall_s,
         }
-
-    def _events(self) -> dict[str, int]:
-        core, own = self.env.core, self.spec.own_team
-        return {
-            name + suffix: int(getattr(core, name)[0, team])
-            for name in ("captures", "grabs", "tags")
-            for suffix, team in (("", own), ("_against", 1 - own))
-        }
-
-    def breaches(self, record: Record, team: int) -> list[dict[str, Any]] | None:
-        """Judge the breaches of a team, 0 blue or 1 red, of the game just played; None where none are judged."""
-        if self._log is None:
-            return None
-        return judge_game(self._log, self.env.core.params, record, team, self.shielding.motion)
-
-    def _verdict_columns(self, record: Record) -> dict[str, Any]:
-        breaches = self.breaches(record, self.spec.own_team)
-        return {**verdict_columns(breaches, self.shielding.separation_m), "breaches": breaches}
-
-    def _decision_columns(self) -> dict[str, float | None]:
-        timed = self._decision_us[1:]  # the first one loads compiled code
-        if not timed:
-            return {"decision_p50_us": None, "decision_p99_us": None, "decision_max_us": None}
-        p50, p99, most = np.quantile(timed, [0.5, 0.99, 1.0])
-        return {"decision_p50_us": float(p50), "decision_p99_us": float(p99), "decision_max_us": float(most)}
-
-
-def _teams(spec: MatchSpec, names: Sequence[str]) -> list[Any]:
-    """The policies; those built before one that cannot be are closed."""
-    with contextlib.ExitStack() as stack:
-        teams = []
-        for name in names:
-            teams.append(make_team(name, spec.game, spec.trust, spec.answer_s))
-            if hasattr(teams[-1], "close"):
-                stack.callback(teams[-1].close)
-        stack.pop_all()
-    return teams
 
 
 def play_match(
@@ -271,21 +236,12 @@ def play_match(
         match.close()
 
 
+def play_again(specs: Iterable[MatchSpec], workers: Workers) -> dict[str, MatchResult]:
+    """Play games again for their records, by key of the spec; those that cannot be played are missing."""
+    played = outcomes(play_match, list(specs), workers)
+    return {outcome.job.key: outcome.answer for outcome in played if outcome.answer is not None}
+
+
 def play_job(job: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Play one game and return its row alone, small enough to travel between processes by the thousand.
-
-    Args:
-        job: a spec's, see `MatchSpec.as_job`.
-    """
+    """Play a game (`MatchSpec.as_job`); its row alone, small enough to travel between processes by the thousand."""
     return [play_match(MatchSpec.of_job(job)).row]
-
-
-def _failure_columns(own: Failures, opponent: Failures) -> dict[str, Any]:
-    texts = [f"own: {text}" for text in own.texts] + [f"opponent: {text}" for text in opponent.texts]
-    return {
-        "policy_failures": own.count,
-        "opponent_policy_failures": opponent.count,
-        "policy_usable_steps": own.usable_steps,
-        "opponent_policy_usable_steps": opponent.usable_steps,
-        "first_failure": texts[0] if texts else None,
-    }

@@ -9,10 +9,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from steerclear.env.config import GameConfig
 from steerclear.env.field import field_geometry
 from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.jit import Array
 
 GAP_M = 8.0
 """Boats start at least this far apart, from each other and from flags."""
@@ -22,14 +22,10 @@ TRIES = 2000
 
 
 def opening(config: GameConfig, seed: int) -> dict[str, Any]:
-    """Draw start places and headings.
+    """Draw start places and headings, the same of the same seed.
 
     Every boat lies at rest on its own side, `GAP_M` or more from every other boat, flag home and field edge
     (less where the field is small), heading for the opponents' flag give or take `SPREAD_DEG`.
-
-    Args:
-        config: the game.
-        seed: the same seed gives the same places.
 
     Returns:
         ``init_dict`` for ``env.reset(options={"init_dict": ...})``.
@@ -37,16 +33,22 @@ def opening(config: GameConfig, seed: int) -> dict[str, Any]:
     Raises:
         ConfigError: obstacles or the number of boats leave no room.
     """
-    field = field_geometry(config)
-    rng = np.random.default_rng([seed, 0x5EA])
-    gap_m = min(GAP_M, float(field.size.min()) / (2.0 * config.team_size))
-    places: list[NDArray[np.float64]] = []
-    headings: list[float] = []
+    field, rng = field_geometry(config), np.random.default_rng([seed, 0x5EA])
+    homes, gap_m = field.flag_home, min(GAP_M, float(field.size.min()) / (2.0 * config.team_size))
+    places, headings = list[Array](), list[float]()
     for boat in range(config.n_boats):
         team = boat // config.team_size
-        place = _draw(config, field.flag_home, field.size, team, places, gap_m, rng)
-        east, north = field.flag_home[1 - team] - place
-        places.append(place)
+        for _ in range(TRIES):
+            place = rng.uniform(gap_m, field.size - gap_m)
+            own, other = np.linalg.norm(homes - place, axis=1)[[team, 1 - team]]
+            # a boat's width clear of the dividing line, so that it starts on its own side
+            clear = min(np.linalg.norm(place - thing) for thing in (*places, *homes)) >= gap_m and other - own > gap_m
+            if clear and not _on_obstacle(config, place, gap_m):
+                break
+        else:
+            raise ConfigError("no start places found; use fewer boats or obstacles, a larger field, or --fixed-start")
+        east, north = homes[1 - team] - place
+        places.append(np.asarray(place))
         headings.append(float(np.degrees(np.arctan2(east, north)) + rng.uniform(-SPREAD_DEG, SPREAD_DEG)))
     return {
         "agent_position": [place.tolist() for place in places],
@@ -55,33 +57,9 @@ def opening(config: GameConfig, seed: int) -> dict[str, Any]:
     }
 
 
-def _draw(
-    config: GameConfig,
-    homes: NDArray[np.float64],
-    size: NDArray[np.float64],
-    team: int,
-    taken: list[NDArray[np.float64]],
-    gap_m: float,
-    rng: np.random.Generator,
-) -> NDArray[np.float64]:
-    keep_off = [*taken, *homes]
-    for _ in range(TRIES):
-        place = rng.uniform(gap_m, size - gap_m)
-        own, other = np.linalg.norm(homes - place, axis=1)[[team, 1 - team]]
-        # a boat's width clear of the dividing line, so that it starts on its own side
-        clear = min(np.linalg.norm(place - thing) for thing in keep_off) >= gap_m and other - own > gap_m
-        if clear and not _on_obstacle(config, place, gap_m):
-            return np.asarray(place)
-    raise ConfigError("no start places found; use fewer boats or obstacles, a larger field, or --fixed-start")
-
-
-def _on_obstacle(config: GameConfig, place: NDArray[np.float64], gap_m: float) -> bool:
-    circles = config.obstacles["circle"] if config.obstacles else ()
-    polygons = config.obstacles["polygon"] if config.obstacles else ()
-    near_circle = any(np.linalg.norm(place - centre) < radius + gap_m for radius, centre in circles)
-    return near_circle or any(_near_polygon(place, np.array(corners), gap_m) for corners in polygons)
-
-
-def _near_polygon(place: NDArray[np.float64], corners: NDArray[np.float64], gap_m: float) -> bool:
-    low, high = corners.min(axis=0) - gap_m, corners.max(axis=0) + gap_m  # its bounding box will do
-    return bool(((place > low) & (place < high)).all())
+def _on_obstacle(config: GameConfig, place: Array, gap_m: float) -> bool:
+    obstacles = config.obstacles or {"circle": (), "polygon": ()}
+    if any(np.linalg.norm(place - centre) < radius + gap_m for radius, centre in obstacles["circle"]):
+        return True
+    boxes = (np.array(corners) for corners in obstacles["polygon"])  # a polygon's bounding box will do
+    return any(bool(((place > b.min(axis=0) - gap_m) & (place < b.max(axis=0) + gap_m)).all()) for b in boxes)

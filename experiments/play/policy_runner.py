@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -34,14 +34,9 @@ class Failures:
 
 
 class PolicyRunner:
-    """Asks one team policy and answers in its stead when it fails: where it raises, its boats stop for that step.
+    """Asks a `TeamPolicy` in the bare env, and answers in its stead when it fails: then its boats stop for that step.
 
     Policies of foreign code report what went wrong with single boats themselves; the seat adds what they report.
-
-    Args:
-        policy: a `steerclear.policies.protocol.TeamPolicy`.
-        env: the game, not wrapped.
-        agent_ids: the policy's boats.
     """
 
     def __init__(self, policy: Any, env: MctfEnv, agent_ids: Sequence[str]) -> None:
@@ -54,15 +49,7 @@ class PolicyRunner:
         self._step = 0
 
     def reset(self, env: Any, seed: int) -> None:
-        """Begin a game.
-
-        Args:
-            env: the env the policy sees.
-            seed: of what the policy draws.
-
-        Raises:
-            SteerclearError: the policy cannot play this game at all.
-        """
+        """Begin a game in the env the policy sees; SteerclearError where it cannot play this game at all."""
         self.policy.reset(env, self.agent_ids, seed)
 
     def act(self, observations: Mapping[str, Any], infos: Mapping[str, Any]) -> dict[str, Any]:
@@ -71,7 +58,8 @@ class PolicyRunner:
         try:
             answer = self.policy.act(observations, infos)
             actions = {agent_id: answer[agent_id] for agent_id in self.agent_ids}
-            self._answered = set(self.agent_ids) - set(_held_by(self.policy))
+            held = getattr(self.policy, "held", None)  # boats whose guarded code gave nothing usable
+            self._answered = set(self.agent_ids) - set(held if isinstance(held, Mapping) else ())
             self._own.usable_steps += bool(self._answered)
             return actions
         except Exception as error:  # a user's policy may raise anything
@@ -111,9 +99,3 @@ class PolicyRunner:
         if not self._own.count:
             logger.warning("policy failed at step %d: %s; its boats hold", self._step, text)
         self._own.add(f"step {self._step}: {text}")
-
-
-def _held_by(policy: Any) -> Collection[str]:
-    """Boats that a guarded policy holds in this step, since their code gave nothing usable."""
-    held = getattr(policy, "held", None)
-    return held if isinstance(held, Mapping) else ()

@@ -16,39 +16,6 @@ from steerclear.policies.entrants.play import EntrantTeam
 from steerclear.policies.scripted.team import ScriptedTeam
 from steerclear.shield.platforms.layout import HEADING, SPEED, X, Y
 
-RECORDED = ("state", "has_flag", "is_tagged", "oob", "is_disabled", "flag_position", "captures")
-"""What a record keeps of a game."""
-Infos = dict[str, dict[str, Any]]
-
-
-class PlayingEnv(MctfEnv):
-    """An `MctfEnv` that can leave its infos out: they take a fifth of a step's time.
-
-    Attributes:
-        tells: whether infos are written; else they are empty.
-    """
-
-    tells = True
-
-    def infos(self) -> Infos:
-        """Infos by agent id; empty where nobody reads them."""
-        return super().infos() if self.tells else {}
-
-
-def read_infos(teams: Iterable[Any]) -> bool:
-    """Whether one of these policies may read infos: all but our own scripted teams and entrants, which see the game."""
-    return not all(_sees_the_game(policy) for policy in teams)
-
-
-def live_view(core: BatchedMctf) -> Any:
-    """What a recorder reads, as the game's own arrays: always of this moment, never copied; valid until a reset."""
-    return SimpleNamespace(**{name: getattr(core.games, name)[0] for name in RECORDED})
-
-
-def _sees_the_game(policy: Any) -> bool:
-    return any(isinstance(policy, team) and type(policy).act is team.act for team in (EntrantTeam, ScriptedTeam))
-
-
 FIRST_ROWS = 1024
 """Rows there is room for at first; when they are full, for twice as many."""
 MARKS = ("has_flag", "is_tagged", "oob", "is_disabled", "flag_position", "captures")
@@ -56,12 +23,31 @@ ORDERS = ("wanted", "sent", "reason", "intervened", "safety_margin_m")
 Rows = NDArray[Any]
 
 
+class PlayingEnv(MctfEnv):
+    """An `MctfEnv` that can leave its infos out (``tells``): they take a fifth of a step's time."""
+
+    tells = True
+
+    def infos(self) -> dict[str, dict[str, Any]]:
+        """Infos by agent id; empty where nobody reads them."""
+        return super().infos() if self.tells else {}
+
+
+def read_infos(teams: Iterable[Any]) -> bool:
+    """Whether one of these policies may read infos: all but our own scripted teams and entrants, which see the game."""
+    ours = (EntrantTeam, ScriptedTeam)
+    return not all(any(isinstance(p, team) and type(p).act is team.act for team in ours) for p in teams)
+
+
+def live_view(core: BatchedMctf) -> Any:
+    """What a recorder reads, as the game's own arrays: always of this moment, never copied; valid until a reset."""
+    return SimpleNamespace(**{name: getattr(core.games, name)[0] for name in ("state", *MARKS)})
+
+
 class Recorder:
     """One game as a record, step by step: as `GameRecorder` does, into arrays made beforehand, in a third of the time.
 
-    Args:
-        game: its arrays as they are now, (n, ...): see `live_view`; the start is taken from them at once.
-        meta: settings of the game, as `GameRecorder.start` takes them.
+    The game is its `live_view`, from which the start is taken at once; its meta is as `GameRecorder.start` takes it.
     """
 
     def __init__(self, game: Any, meta: Mapping[str, Any]) -> None:
@@ -75,15 +61,7 @@ class Recorder:
         self._note_state(0)
 
     def step(self, wanted: Rows, sent: Rows, reason: Rows, intervened: Rows, safety_margin_m: Rows) -> None:
-        """Add a step; the state after it is taken from the game.
-
-        Args:
-            wanted: (n, 2) speed m/s and absolute heading deg asked for before the step.
-            sent: (n, 2) likewise, what the boats were told.
-            reason: (n,) reason codes.
-            intervened: (n,) bool.
-            safety_margin_m: (n,) certificate values, m.
-        """
+        """Add a step: commands (n, 2) of speed m/s and absolute heading deg, (n,) the rest; the state is the game's."""
         step = self._steps
         if step + 2 > len(self._rows["wanted"]):
             self._rows = {name: np.concatenate([rows, np.zeros_like(rows)]) for name, rows in self._rows.items()}
@@ -93,11 +71,7 @@ class Recorder:
         self._steps = step + 1
 
     def finish(self) -> Record:
-        """The record, checked, without breaches.
-
-        Raises:
-            TraceError: what was recorded does not fit together.
-        """
+        """The record, without breaches; TraceError where it does not fit together."""
         arrays = {name: rows[: self._steps + (LAYOUT[name][0][0] == "T+1")].copy() for name, rows in self._rows.items()}
         return make_record(self._meta, breaches=np.zeros((0, 4)), **arrays)
 

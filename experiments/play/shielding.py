@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -48,7 +48,6 @@ class Shielding:
         wrappers: one per shielded team.
         agent_ids: boats that a shield decides for.
         separation_m: radius the own shield keeps (the default's without one), m.
-        reason_names: names of the reason codes, by code.
         disturbances: the conditions at work; None where there are none.
     """
 
@@ -57,7 +56,6 @@ class Shielding:
     wrappers: list[ShieldedParallelEnv] = field(default_factory=list)
     agent_ids: list[str] = field(default_factory=list)
     separation_m: float = RADII_M[0]
-    reason_names: list[str] = field(default_factory=list)
     disturbances: Disturbances | None = None
     _listener: Listener | None = None
     _commands: Array | None = None
@@ -66,6 +64,11 @@ class Shielding:
     def motion(self) -> Motion:
         """What the oracle has to know of the conditions."""
         return AT_ONCE if self.disturbances is None else self.disturbances.motion
+
+    @property
+    def reason_names(self) -> list[str]:
+        """Names of the reason codes, by code; none without a shield."""
+        return [reason.name for reason in Reason] if self.wrappers else []
 
     def listen(self, listener: Listener) -> None:
         """Hear of every step's commands, before and after the shields; call once per game, after reset.
@@ -98,19 +101,16 @@ class Shielding:
     def read(self) -> Seen:
         """Collect what the shields decided last."""
         n = len(self.inner.possible_agents)
-        seen = Seen(np.full(n, NOT_COVERED, np.uint8), np.zeros(n, bool), np.full(n, np.nan, np.float32), None)
-        times_s = []
-        for wrapper in self.wrappers:
-            decisions = wrapper.decisions
-            if decisions is None:
-                continue
-            own = decisions.reason != NOT_COVERED
-            seen.reason[own] = decisions.reason[own]
-            seen.intervened[own] = decisions.intervened[own]
-            margin_m = decisions.safety_margin_m[own]
-            seen.safety_margin_m[own] = np.where(margin_m < NOBODY_NEAR_M, margin_m, np.nan)
-            times_s.append(decisions.solve_time_s)
-        return Seen(seen.reason, seen.intervened, seen.safety_margin_m, max(times_s, default=None))
+        reason, intervened = np.full(n, NOT_COVERED, np.uint8), np.zeros(n, bool)
+        margins_m, times_s = np.full(n, np.nan, np.float32), []
+        for decisions in (wrapper.decisions for wrapper in self.wrappers):
+            if decisions is not None:
+                own = decisions.reason != NOT_COVERED
+                reason[own], intervened[own] = decisions.reason[own], decisions.intervened[own]
+                margin_m = decisions.safety_margin_m[own]
+                margins_m[own] = np.where(margin_m < NOBODY_NEAR_M, margin_m, np.nan)
+                times_s.append(decisions.solve_time_s)
+        return Seen(reason, intervened, margins_m, max(times_s, default=None))
 
 
 def shield_game(env: MctfEnv, spec: MatchSpec) -> Shielding:
@@ -123,35 +123,21 @@ def shield_game(env: MctfEnv, spec: MatchSpec) -> Shielding:
     """
     # the library warns of a shield that keeps less than the game's distance; here hits are counted at both
     logging.getLogger(game_facts.__name__).setLevel(logging.ERROR)
-    shielding = Shielding(env, env)
+    shielding, dt_s, size = Shielding(env, env), env.config.dt_s, env.config.team_size
     if not spec.conditions.calm:
         shielding.disturbances = Disturbances(env, spec.conditions, spec.seed, spec.own_team)
-    for side, settings in _settings_by_side(spec).items():
-        if settings is not None:
-            told = spec.conditions if side == spec.side else replace(spec.conditions, delay_s=0.0)
-            _add(shielding, side, {**told.shield_settings(env.config.dt_s), **settings}, spec.shield_autopilot)
+    for team in (spec.own_team, 1 - spec.own_team):
+        if (settings := spec.shields[team]) is None:
+            continue
+        told = spec.conditions if team == spec.own_team else replace(spec.conditions, delay_s=0.0)
+        told_settings = {"dt_s": dt_s, "separation_m": RADII_M[0], **told.shield_settings(dt_s)}
+        shield = Shield(ShieldConfig.of(**{**told_settings, **settings}))
+        reader = None if shielding.disturbances is None else shielding.disturbances.reader()
+        side, autopilot = SIDES[team], spec.shield_autopilot
+        shielding.env = ShieldedParallelEnv(shielding.env, shield, side, autopilot, reader=reader)
+        shielding.wrappers.append(shielding.env)
+        shielding.agent_ids += env.possible_agents[size * team : size * (team + 1)]
     given = spec.shield if spec.shield is not None else spec.opponent_shield
     if given is not None:
         shielding.separation_m = float(given.get("separation_m", RADII_M[0]))
     return shielding
-
-
-def _settings_by_side(spec: MatchSpec) -> dict[str, Mapping[str, Any] | None]:
-    other = SIDES[1 - spec.own_team]
-    return {spec.side: spec.shield, other: spec.opponent_shield}
-
-
-def _add(shielding: Shielding, side: str, settings: Mapping[str, Any], shield_autopilot: bool) -> None:
-    config = ShieldConfig.of(**{"dt_s": shielding.inner.config.dt_s, "separation_m": RADII_M[0], **settings})
-    reader = None if shielding.disturbances is None else shielding.disturbances.reader()
-    wrapped = ShieldedParallelEnv(shielding.env, Shield(config), side, shield_autopilot, reader=reader)
-    shielding.env = wrapped
-    shielding.wrappers.append(wrapped)
-    shielding.reason_names = [reason.name for reason in Reason]
-    shielding.agent_ids += _boats_of(shielding.inner, side)
-
-
-def _boats_of(env: MctfEnv, side: str) -> Sequence[str]:
-    size = env.config.team_size
-    first = size * SIDES.index(side)
-    return env.possible_agents[first : first + size]

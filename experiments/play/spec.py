@@ -70,7 +70,8 @@ class MatchSpec:
 
     def __post_init__(self) -> None:
         check_seed(self.seed)
-        check_side(self.side)
+        if self.side not in SIDES:
+            raise ConfigError(f"unknown side {self.side!r}; {near(self.side, SIDES)}")
         check_judge(self.judge)
         if not 0.0 < self.answer_s <= MOST_ANSWER_S:
             raise ConfigError(f"--answer-time must be above 0 and at most {MOST_ANSWER_S:g} s; got {self.answer_s:g}")
@@ -91,6 +92,18 @@ class MatchSpec:
         return SIDES.index(self.side)
 
     @property
+    def shields(self) -> tuple[Mapping[str, Any] | None, Mapping[str, Any] | None]:
+        """Settings of the shields of blue and red."""
+        both = (self.shield, self.opponent_shield)
+        return both if self.own_team == 0 else both[::-1]
+
+    @property
+    def judged(self) -> bool:
+        """Whether the oracle judges this game's breaches."""
+        shielded = self.shield is not None or self.opponent_shield is not None
+        return self.judge == "all" or (self.judge == "shielded" and shielded)
+
+    @property
     def key(self) -> str:
         """Short name that two specs share exactly when they describe the same game."""
         return job_id(self.as_job())
@@ -106,27 +119,13 @@ class MatchSpec:
         radii_m, files = tuple(job["radii_m"]), tuple(job["files"])
         return cls(**{**known, "conditions": Conditions(**job["conditions"]), "radii_m": radii_m, "files": files})
 
-    @property
-    def judged(self) -> bool:
-        """Whether the oracle judges this game's breaches."""
-        shielded = self.shield is not None or self.opponent_shield is not None
-        return self.judge == "all" or (self.judge == "shielded" and shielded)
-
     def config(self) -> GameConfig:
-        """Build the game's settings.
-
-        Raises:
-            ConfigError: the preset or a setting is unknown or out of range.
-        """
+        """The game's settings; ConfigError where the preset or a setting is unknown or out of range."""
         return GameConfig.preset(self.preset, **self.rules)
 
 
 def check_seed(seed: int) -> None:
-    """Refuse seeds that no random numbers can be drawn from, or whose games' seeds no record or table can hold.
-
-    Raises:
-        ConfigError: a negative one, or one beyond `LARGEST_SEED`.
-    """
+    """Refuse (ConfigError) seeds that nothing can be drawn from, or whose games' seeds no record or table can hold."""
     if seed < 0:
         raise ConfigError(f"--seed must be 0 or more; got {seed}")
     if seed > LARGEST_SEED:
@@ -134,24 +133,9 @@ def check_seed(seed: int) -> None:
 
 
 def check_count(option: str, number: int, low: int, high: int) -> None:
-    """Refuse a number of things that are none, or too many to be listed.
-
-    Raises:
-        ConfigError: it is not from ``low`` to ``high``.
-    """
+    """Refuse (ConfigError) a number of things that are none, or too many to be listed."""
     if not low <= number <= high:
         raise ConfigError(f"{option} must be at least {low} and at most {high:,}; got {number:,}")
-
-
-def check_side(side: str) -> str:
-    """Return the side.
-
-    Raises:
-        ConfigError: neither blue nor red.
-    """
-    if side not in SIDES:
-        raise ConfigError(f"unknown side {side!r}; {near(side, SIDES)}")
-    return side
 
 
 def near(name: str, known: Iterable[str]) -> str:

@@ -20,7 +20,7 @@ from steerclear.shield.bridge.clock import Clock, MonotonicClock
 from steerclear.shield.bridge.fleet_file import FleetFile, load_fleet
 from steerclear.shield.bridge.fleet_settings import MoosLinkSettings
 from steerclear.shield.bridge.frame import FieldFrame
-from steerclear.shield.bridge.links import key_of
+from steerclear.shield.bridge.session import key_of
 from steerclear.shield.compat import Self
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array

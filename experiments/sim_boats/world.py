@@ -7,8 +7,8 @@ from collections import deque
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+from steerclear.shield.bridge.feed import FeedSender
 from steerclear.shield.bridge.feed_packets import Fix
-from steerclear.shield.bridge.feed_sender import FeedSender
 from steerclear.shield.bridge.frame import FieldFrame
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import layout as L

@@ -1,4 +1,4 @@
-// Unpacking the games that are embedded in this file. The writer (replay_data.py) describes the format.
+// Unpacking the games that are embedded in this file. The writer (replay_html.py) describes the format.
 
 const NOT_COVERED = 6;  // reason code of a boat for which no shield decided
 

@@ -19,6 +19,7 @@ from ..fleet import Fleet
 from ..platforms import layout as L
 from ..shield import Shield
 from ..surroundings import Surroundings
+from ..tracks import whole_steps
 from .clock import Clock
 from .failsafe import Responder, Verdict
 from .fleet_file import FleetFile
@@ -47,18 +48,14 @@ class Steered:
 
 
 class CommandPipeline:
-    """Takes what boats should do to the shield and its answer to the boats.
-
-    Args:
-        fleet: the file.
-        shield: the one shield.
-        links: of the boats this process commands, by name.
-        clock: of all times.
-    """
+    """Takes what boats should do to the one shield, and its answer to the links of the boats this process commands."""
 
     def __init__(self, fleet: FleetFile, shield: Shield, links: Mapping[str, Link], clock: Clock) -> None:
         self._file, self._shield, self._links, self._clock = fleet, shield, links, clock
-        self._responders = {name: Responder(fleet.platform_of[name], fleet.geofence.box) for name in links}
+        self._responders = {name: Responder(fleet.platform_of[name], fleet.geofence) for name in links}
+        config = fleet.shield_config
+        self._line_m = config.beyond_m if config.beyond_m is not None and config.beyond_then == "stop" else math.inf
+        self._delay_s = whole_steps(config.delay_s, config.dt_s) * config.dt_s
         self._fresh = True
         self._failure = ("", -math.inf)
 
@@ -97,8 +94,8 @@ class CommandPipeline:
         actions: list[Action] = []
         sent = {name: self._send(name, decisions, actions) for name in commanded}
         beyond = frozenset(action.subject for action in actions if action.condition == "hard_line")
-        steered = replace(so_far, decisions=decisions, shield_reset=reset, sent=sent, beyond=beyond)
-        return self._finish(replace(steered, actions=tuple(actions)), verdict)
+        steered = Steered(fleet, nominal, surroundings, decisions, reset, sent, tuple(actions), beyond)
+        return self._finish(steered, verdict)
 
     def stop_all(self, names: Collection[str]) -> dict[str, Sent]:
         """Tell boats to stop by their links' surest way, past the shield."""
@@ -123,9 +120,9 @@ class CommandPipeline:
         fleet = decisions.fleet
         i = fleet.names.index(name)
         if decisions.reason[i] == Reason.STOPPED:
-            outside_m, beyond_m = float(decisions.outside_m[i]), self._file.shield_config.beyond_m
+            outside_m = self._outside_m(fleet, i)
             what, text = "obstacle", f"{name} can only stop before an obstacle: stopped by its link"
-            if beyond_m is not None and outside_m > beyond_m:
+            if outside_m > self._line_m:
                 what = "hard_line"
                 text = f"{name} is {outside_m:.1f} m outside, beyond the hard line: stopped by its link, handed over"
             actions.append(Action(name, what, "stop", text))
@@ -137,6 +134,13 @@ class CommandPipeline:
             LOG.error("%s: command (%s rad, %s m/s) not sent: %s; told to stop", name, heading, speed, error)
             actions.append(Action(name, "send", "stop", f"the command was not sent ({error}); the link's own stop"))
             return self._links[name].stop()
+
+    def _outside_m(self, fleet: Fleet, i: int) -> float:
+        """How far outside a boat is, now or once a command works, for which the shield decides, m."""
+        (x, y), heading, way = fleet.position_m[i], fleet.heading_rad[i], fleet.state[i, L.SPEED] * self._delay_s
+        left, low, right, high = self._file.geofence.box
+        places = ((x, y), (x + way * math.sin(heading), y + way * math.cos(heading)))
+        return float(max(max(left - x, low - y, x - right, y - high) for x, y in places))
 
     def _failed(self, so_far: Steered, commanded: Collection[str], error: Exception) -> Steered:
         self._fresh = True

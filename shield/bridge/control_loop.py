@@ -18,20 +18,19 @@ from ..surroundings import OPEN_WATER, Surroundings
 from .clock import Clock
 from .command_pipeline import CommandPipeline, Steered
 from .failsafe import Failsafe, Seen, Verdict, at_rest, nearing
+from .feed_packets import GameSource, GameState
 from .fleet_file import FleetFile
-from .game_state import GameSource, GameState
 from .messages import (
     Action,
     Alarming,
     BoatReading,
-    Contact,
     ContactSource,
     Link,
     Snapshot,
     Tick,
     TickSink,
     WantedSource,
-    contact_of,
+    contacts_heard,
 )
 from .model_error import ModelErrorMonitor
 from .operator import Operator
@@ -51,36 +50,20 @@ BIN_S, BINS = 0.0001, 20_000
 
 @dataclass(frozen=True)
 class Parts:
-    """What the loop works with.
+    """What the loop works with."""
 
-    Attributes:
-        links: of the boats this process commands, connected and prepared.
-        ears: links that are only listened to, of boats somebody else commands.
-        contacts: other sources of positions.
-        game: the referee's state of the game; None: none.
-        grounds: static constraints of the game, see `StaticObstacles`.
-        policy: where nominal commands come from.
-        sinks: get every tick; the black box among them.
-    """
-
-    links: Mapping[str, Link]
-    policy: WantedSource
+    links: Mapping[str, Link]  # of the boats this process commands, connected and prepared
+    policy: WantedSource  # where nominal commands come from
+    # links that are only listened to, of boats somebody else commands
     ears: Mapping[str, Link] = field(default_factory=dict)
-    contacts: Sequence[ContactSource] = ()
-    game: GameSource | None = None
-    grounds: Surroundings = OPEN_WATER
-    sinks: Sequence[TickSink] = ()
+    contacts: Sequence[ContactSource] = ()  # other sources of positions
+    game: GameSource | None = None  # the referee's state of the game; None: none
+    grounds: Surroundings = OPEN_WATER  # static constraints of the game, see `StaticObstacles`
+    sinks: Sequence[TickSink] = ()  # get every tick; the black box among them
 
 
 class ControlLoop:
-    """Runs boats.
-
-    Args:
-        fleet: the file.
-        parts: links, policy, sources and sinks; the loop closes none of them.
-        operator: STOP ALL, overrides, the end.
-        clock: of all times; the links and the feed have the same.
-        shield: the shield; None: one with the file's settings.
+    """Runs boats of a file with parts of which it closes none; without a shield it makes one with the file's settings.
 
     Attributes:
         tracker, failsafe, model_error: what it knows of the boats.
@@ -97,27 +80,23 @@ class ControlLoop:
         self.failsafe = Failsafe(fleet, self.tracker)
         self.model_error = ModelErrorMonitor(fleet, tuple(parts.links))
         self.near: tuple[str, ...] = ()
-        obstacles = StaticObstacles(fleet, parts.grounds)
-        self._obstacles = obstacles
-        chosen = Shield(fleet.shield_config, obstacles.forms[0]) if shield is None else shield
+        self._obstacles = StaticObstacles(fleet, parts.grounds)
+        chosen = Shield(fleet.shield_config, self._obstacles.forms[0]) if shield is None else shield
         self._pipeline = CommandPipeline(fleet, chosen, parts.links, clock)
         self._reacquisition = Reacquisition(parts.links)
-        self._recorder = Recorder(parts.sinks)
         self._has_referee = fleet.feed is not None and fleet.feed.referee is not None and parts.game is not None
         per_boat = fleet.coordination != "team"
         self._mates = tuple(boat.name for boat in fleet.ours if per_boat and boat.name not in parts.links)
         self._number, self._broke_s, self._ending = 0, -math.inf, ""
         self._readings: dict[str, BoatReading] = {}
         self._decided: Decisions | None = None
+        self._log_fault, self._broken = "", set[int]()
 
     def run(self, seconds: float | None = None) -> str:
         """Turn at the file's rate until the operator ends it or the time is over, then bring boats to rest.
 
         At the end boats are told to stop and go on behind the shield until they lie still and nobody is on the way to
         one of them: a boat that only stops may drift into another, and one that nobody steers is defended by nobody.
-
-        Args:
-            seconds: how long, s on the loop's clock; None: until ended.
 
         Returns:
             Why it ended.
@@ -128,8 +107,8 @@ class ControlLoop:
             due = self._keep_on(began, lambda due: not self.operator.ended and due < last)
             self._ending = self.operator.ended or f"ran for {self.clock.now_s() - began:.0f} s"
             latest = due + self.fleet.end.longest_s
-            self._keep_on(due, lambda now: now < latest and not self._is_clear())
-            self.near = tuple(nearing(self.fleet, self.tracker, self._readings))
+            self._keep_on(due, lambda now: now < latest and not (at_rest(self._readings) and not self._nearing()))
+            self.near = tuple(self._nearing())
             for text in self.near:
                 LOG.warning("handed over although %s: take it over by hand", text)
         finally:
@@ -145,9 +124,8 @@ class ControlLoop:
             due_s = self.overruns.next_due(due_s, self.clock.now_s())
         return due_s
 
-    def _is_clear(self) -> bool:
-        """Whether boats can be handed over: they lie still, and nobody is on the way to one of them."""
-        return at_rest(self._readings) and not nearing(self.fleet, self.tracker, self._readings)
+    def _nearing(self) -> list[str]:
+        return nearing(self.fleet, self.tracker, self._readings)
 
     def turn_or_stop(self, due_s: float) -> None:
         """A turn; one that breaks where none should leaves boats told to stop, and the next one is tried."""
@@ -165,20 +143,16 @@ class ControlLoop:
         self._pipeline.stop_all([n for n in self.parts.links if n not in readings or not readings[n].released])
 
     def turn(self, due_s: float) -> Tick:
-        """One turn.
-
-        Args:
-            due_s: when it was due.
-        """
-        began = self.clock.now_s()
-        self._readings = readings = {name: link.read() for name, link in self.parts.links.items()}
-        contacts = self._contacts()
+        """One turn, due at that time."""
+        began, parts = self.clock.now_s(), self.parts
+        self._readings = readings = {name: link.read() for name, link in parts.links.items()}
+        contacts = contacts_heard(parts.contacts, parts.ears, self.fleet.shield_config.position_error_m)
         self.tracker.update(began, readings, contacts)
         self.model_error.update(self.tracker.own_rows(), readings)
         self.tracker.margin_m = self.model_error.margin_m
-        answer = self.parts.policy.latest()
-        source = self.parts.game
-        game, game_age = (None, math.inf) if source is None else (source.game(), source.game_age_s())
+        answer = parts.policy.latest()
+        game, game_age = (None, math.inf) if parts.game is None else (parts.game.game(), parts.game.game_age_s())
+        heard = [alarm for source in parts.contacts if isinstance(source, Alarming) for alarm in source.alarms()]
         verdict = self.failsafe.judge(
             Seen(
                 now_s=began,
@@ -187,12 +161,9 @@ class ControlLoop:
                 game_age_s=game_age,
                 game_expected=self._has_referee,
                 game_over=game is not None and game.over,
-                log_fault=self._recorder.fault,
+                log_fault=self._log_fault,
                 overrides=self.operator.active(began),
-                alarms=(
-                    *self.tracker.alarms(),
-                    *(a for source in self.parts.contacts if isinstance(source, Alarming) for a in source.alarms()),
-                ),
+                alarms=(*self.tracker.alarms(), *heard),
                 outside_model_s={name: self.model_error.outside_s(name) for name in readings},
                 decided=self._decided,
             )
@@ -227,8 +198,8 @@ class ControlLoop:
             game={} if game is None else game.as_dict(),
         )
         self._number += 1
-        self._recorder.take(tick)
-        self.parts.policy.offer(Snapshot(tick.number, began, self.tracker.seen_now(), tick.game, game_age))
+        self._record(tick)
+        parts.policy.offer(Snapshot(tick.number, began, self.tracker.seen_now(), tick.game, game_age))
         return tick
 
     def _steer(self, answer: Commands | None, verdict: Verdict, game: GameState | None, game_age_s: float) -> Steered:
@@ -248,35 +219,39 @@ class ControlLoop:
         """Take back boats the operator asks for, and those whose fail-safe is over where the file says so."""
         why_not = "the run ends" if self._ending else "STOP ALL is in force" if self.operator.stopped else ""
         requests = list(self.operator.take_requests())
-        for boat, _ in requests:
-            self.failsafe.handed_over.discard(boat)
         asked = {boat for boat, _ in requests}
+        self.failsafe.handed_over -= asked
         requests += [(boat, "after_failsafe") for boat in sorted(verdict.retake - asked) if not why_not]
         self._reacquisition.look(requests, self._readings, now_s, why_not)
 
-    def _contacts(self) -> tuple[Contact, ...]:
-        error = self.fleet.shield_config.position_error_m
-        told = [contact_of(link.read(), error) for link in self.parts.ears.values()]
-        heard = [contact for source in self.parts.contacts for contact in source.read()]
-        return (*heard, *(contact for contact in told if contact is not None))
+    def _record(self, tick: Tick) -> None:
+        """Give a tick to all sinks, whatever one of them does; one that can keep no more is named once."""
+        faults, broken = [], set[int]()
+        for k, sink in enumerate(self.parts.sinks):
+            try:
+                sink.take(tick)
+            except Exception as error:
+                broken.add(k)
+                declared = isinstance(error, BridgeError)
+                faults += [str(error)] if declared else []
+                if k not in self._broken:
+                    text = str(error) if declared else "a sink broke; it gets no boat into danger"
+                    LOG.error("%s", text, exc_info=not declared)
+        self._log_fault, self._broken = "; ".join(faults), broken
 
 
 class Overruns:
-    """Keeps the rate, and counts turns that began late or took longer than a step.
+    """Keeps a rate of a step of ``dt_s``, s, and counts turns that began late or took longer than a step.
 
     Attributes:
         turns: so far.
         late: turns after which at least one due time was missed.
         missed: due times missed.
         worst_s: latest end of a turn after the next was due, s.
-
-    Args:
-        dt_s: step, s.
     """
 
     def __init__(self, dt_s: float) -> None:
-        self._dt_s = dt_s
-        self._told_s = -math.inf
+        self._dt_s, self._told_s = dt_s, -math.inf
         self.turns, self.late, self.missed, self.worst_s = 0, 0, 0, 0.0
 
     def next_due(self, due_s: float, now_s: float) -> float:
@@ -296,45 +271,10 @@ class Overruns:
         return due + missed * self._dt_s
 
 
-class Recorder:
-    """Gives every tick to every sink, whatever one of them does.
-
-    Args:
-        sinks: the black box among them.
-
-    Attributes:
-        fault: why ticks can no longer be kept; empty: they are.
-    """
-
-    def __init__(self, sinks: Sequence[TickSink]) -> None:
-        self.fault = ""
-        self._sinks = sinks
-        self._broken: set[int] = set()
-
-    def take(self, tick: Tick) -> None:
-        """Give a tick to all; a sink that can keep no more is named once, and the others still get it."""
-        faults = []
-        for k, sink in enumerate(self._sinks):
-            try:
-                sink.take(tick)
-                self._broken.discard(k)
-                continue
-            except BridgeError as error:
-                faults.append(str(error))
-                if k not in self._broken:
-                    LOG.error("%s", error)
-            except Exception:
-                if k not in self._broken:
-                    LOG.exception("a sink broke; it gets no boat into danger")
-            self._broken.add(k)
-        self.fault = "; ".join(faults)
-
-
 class Reacquisition:
-    """Takes back boats that somebody took from us when asked to and never otherwise; beside the loop: that never waits.
+    """Takes back boats, by their links, that somebody took from us when asked to and never otherwise.
 
-    Args:
-        links: of the boats this process commands.
+    It works beside the loop: that never waits.
     """
 
     def __init__(self, links: Mapping[str, Link]) -> None:
@@ -347,14 +287,7 @@ class Reacquisition:
     def look(
         self, requests: Iterable[tuple[str, str]], readings: Mapping[str, BoatReading], now_s: float, why_not: str = ""
     ) -> None:
-        """Begin what is asked for.
-
-        Args:
-            requests: boats, and who asked.
-            readings: of own boats; one that obeys needs nothing.
-            now_s: time, s.
-            why_not: why boats are not to be taken back now; what is under way is called off. Empty: they may be.
-        """
+        """Begin what is asked for (boats, and who asked); with ``why_not`` not, and what is under way is called off."""
         if why_not:
             self._off.set()
         elif self._off.is_set():
@@ -405,10 +338,12 @@ class Timing:
 
     def take(self, tick: Tick) -> None:
         """Count one tick."""
-        self._add("late", tick.began_s - tick.due_s)
-        self._add("turn", tick.sent_s - tick.began_s)
+        durations_s = {"late": tick.began_s - tick.due_s, "turn": tick.sent_s - tick.began_s}
         if tick.decisions is not None:
-            self._add("decide", tick.decisions.solve_time_s)
+            durations_s["decide"] = tick.decisions.solve_time_s
+        for name, duration_s in durations_s.items():
+            self._counts[name][min(BINS - 1, max(0, int(duration_s / BIN_S)))] += 1
+            self._longest_s[name] = max(self._longest_s[name], duration_s)
 
     def close(self) -> None:
         """Nothing to finish."""
@@ -424,10 +359,6 @@ class Timing:
             "read_to_sent_max_s": self._longest_s["turn"],
             "decide_p99_s": self._quantile_s("decide", 0.99),
         }
-
-    def _add(self, name: str, duration_s: float) -> None:
-        self._counts[name][min(BINS - 1, max(0, int(duration_s / BIN_S)))] += 1
-        self._longest_s[name] = max(self._longest_s[name], duration_s)
 
     def _quantile_s(self, name: str, share: float) -> float:
         """Upper edge of the bin that this share of durations does not exceed, s."""

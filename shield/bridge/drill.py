@@ -23,7 +23,7 @@ from .fleet_file import FleetFile
 from .messages import Answer, BoatReading, Snapshot, Tick
 from .model_error import AHEAD_S as PREDICTED_S
 from .model_error import ENOUGH_S, SHARE, TOLD_BY, ModelErrorMonitor
-from .preflight_checks import Check, CheckResult
+from .preflight_checks import Check, CheckResult, found
 
 AHEAD_S = 8.0
 TURN_S = 7.0
@@ -63,29 +63,19 @@ MOST_CHANGED = 0.4
 
 @dataclass(frozen=True)
 class DrillSample:
-    """One turn of the loop.
+    """One turn of the loop."""
 
-    Attributes:
-        time_s: of the turn.
-        reading: of the boat.
-        heading_rad, speed_mps: as sent; NaN when nothing was.
-        changed: whether something else than the drill's own command was decided: the shield gave way, a declared
-            response was due, or nothing could be decided.
-    """
-
-    time_s: float
-    reading: BoatReading
-    heading_rad: float
+    time_s: float  # of the turn
+    reading: BoatReading  # of the boat
+    heading_rad: float  # as sent; NaN when nothing was
     speed_mps: float
+    # whether something else than the drill's own command was decided: the shield gave way, a declared response was
+    # due, or nothing could be decided
     changed: bool = False
 
 
 class Drill:
-    """A `WantedSource` and a `TickSink`.
-
-    Args:
-        fleet: the file.
-        boats: to drill, in order; all others of the process lie still.
+    """A `WantedSource` and a `TickSink`: boats are drilled in order; all others of the process lie still.
 
     Attributes:
         seconds: how long it takes.
@@ -197,9 +187,6 @@ class Drill:
 class Missed:
     """A `TickSink` that keeps, of the boat whose turn it is, how far it is from where it was predicted, m.
 
-    Args:
-        drill: the drill that is driven.
-
     Attributes:
         model_error: the loop's monitor; set before the loop runs.
         errors_m: by boat's name, rows of the errors of `PREDICTED_S`; NaN where there is no telling.
@@ -220,47 +207,8 @@ class Missed:
         """Nothing is held."""
 
 
-def check_model(
-    boat: str, errors_m: list[tuple[float, ...]], platform: Platform, most_m: float, dt_s: float
-) -> CheckResult:
-    """The boat was where its model foresaw it, near enough that it would not be slowed for it (``limits.model``).
-
-    Args:
-        boat: its name.
-        errors_m: rows of `Missed.errors_m`.
-        platform: of the boat.
-        most_m: `ModelLimit.outside_m`.
-        dt_s: step of the loop, s.
-    """
-    name = f"model:{boat}"
-    errors = np.array(errors_m, dtype=float).reshape(-1, len(PREDICTED_S))
-    errors = errors[np.isfinite(errors).all(axis=1)]
-    if len(errors) * dt_s < ENOUGH_S:
-        text = (
-            f"its place was known and foreseen for {len(errors) * dt_s:.1f} s of its drill, {ENOUGH_S:g} s are needed; "
-            "see its rates and links, then run again"
-        )
-        return CheckResult(name, False, text, {"judged_s": len(errors) * dt_s})
-    missed_m = np.quantile(errors, SHARE, axis=0)
-    figures = {f"missed_{ahead:g}s_m": float(missed) for ahead, missed in zip(PREDICTED_S, missed_m, strict=True)}
-    words = f"its model misses {'/'.join(f'{missed:.1f}' for missed in missed_m)} m 1/2/3 s ahead (95 of 100)"
-    if missed_m[TOLD_BY] > most_m:
-        text = (
-            f"{words}, and beyond {most_m:g} m it would be slowed and handed over (limits.model); drive "
-            f"steerclear sea-trial, and put what steerclear fit makes of its log in place of {platform.name}"
-        )
-        return CheckResult(name, False, text, figures)
-    return CheckResult(name, True, words, figures)
-
-
 def drill_checks(drill: Drill, missed: Missed, fleet: FleetFile) -> list[Check]:
-    """Checks of a drill that has been driven.
-
-    Args:
-        drill: with its samples.
-        missed: what the boats' models missed meanwhile.
-        fleet: the file: platforms, step and limits.
-    """
+    """Checks of a drill that has been driven, with its samples and what the boats' models missed meanwhile."""
     checks, dt_s, most_m = [], fleet.dt_s, fleet.limits.model.outside_m
     for boat, samples in drill.samples.items():
         platform, errors_m = fleet.platform_of[boat], missed.errors_m[boat]
@@ -270,26 +218,47 @@ def drill_checks(drill: Drill, missed: Missed, fleet: FleetFile) -> list[Check]:
     return checks
 
 
+def check_model(
+    boat: str, errors_m: list[tuple[float, ...]], platform: Platform, most_m: float, dt_s: float
+) -> CheckResult:
+    """The boat was where its model foresaw it, near enough that it would not be slowed for it (``limits.model``)."""
+    errors = np.array(errors_m, dtype=float).reshape(-1, len(PREDICTED_S))
+    errors = errors[np.isfinite(errors).all(axis=1)]
+    judged_s = len(errors) * dt_s
+    if judged_s < ENOUGH_S:
+        text = (
+            f"its place was known and foreseen for {judged_s:.1f} s of its drill, {ENOUGH_S:g} s are needed; "
+            "see its rates and links, then run again"
+        )
+        return CheckResult(f"model:{boat}", False, text, {"judged_s": judged_s})
+    missed_m = np.quantile(errors, SHARE, axis=0)
+    fine = f"its model misses {'/'.join(f'{missed:.1f}' for missed in missed_m)} m 1/2/3 s ahead (95 of 100)"
+    fault = (
+        f"{fine}, and beyond {most_m:g} m it would be slowed and handed over (limits.model); drive "
+        f"steerclear sea-trial, and put what steerclear fit makes of its log in place of {platform.name}"
+    )
+    figures = {f"missed_{ahead:g}s_m": float(missed) for ahead, missed in zip(PREDICTED_S, missed_m, strict=True)}
+    return CheckResult(f"model:{boat}", *found(fine, figures, (missed_m[TOLD_BY] > most_m, fault)))
+
+
 def check_course(boat: str, samples: Sequence[DrillSample]) -> CheckResult:
     """On straight runs the boat goes where it points."""
-    name = f"course:{boat}"
-    off = [
-        s.reading.heading_rad - s.reading.course_rad
+    straight = (
+        s.reading
         for s in samples
         if s.reading.speed_mps > COURSE_MPS and abs(s.reading.turn_rate_rads) < math.radians(STEADY_DPS)
-    ]
-    off = [value for value in off if math.isfinite(value)]
+    )
+    off = [value for reading in straight if math.isfinite(value := reading.heading_rad - reading.course_rad)]
     if len(off) < FEWEST:
         text = (
             f"it ran straight at more than {COURSE_MPS:g} m/s for too short; see its response, give it room, run again"
         )
-        return CheckResult(name, False, text, {"samples": float(len(off))})
+        return CheckResult(f"course:{boat}", False, text, {"samples": float(len(off))})
     mean = math.degrees(math.atan2(np.mean(np.sin(off)), np.mean(np.cos(off))))
+    fault = f"it points {mean:+.0f} deg off its course; calibrate its compass, or wait for less current"
     figures = {"heading_less_course_deg": mean, "samples": float(len(off))}
-    if not abs(mean) <= COURSE_DEG:
-        text = f"it points {mean:+.0f} deg off its course; calibrate its compass, or wait for less current"
-        return CheckResult(name, False, text, figures)
-    return CheckResult(name, True, f"points {mean:+.1f} deg off its course", figures)
+    fine = f"points {mean:+.1f} deg off its course"
+    return CheckResult(f"course:{boat}", *found(fine, figures, (not abs(mean) <= COURSE_DEG, fault)))
 
 
 @dataclass(frozen=True)
@@ -323,8 +292,7 @@ def check_response(boat: str, samples: Sequence[DrillSample], platform: Platform
         )
         return CheckResult(name, False, text, {"changed_share": changed})
     fits = [_fit(told, measured, platform, dt_s, steps) for steps in range(LONGEST_DELAY_STEPS + 1)]
-    fit = min(fits, key=lambda f: f.cost)
-    delay_s = _delay_s([f.heading_deg**2 for f in fits], dt_s)
+    fit, delay_s = min(fits, key=lambda f: f.cost), _delay_s([f.heading_deg**2 for f in fits], dt_s)
     figures = {
         "delay_s": delay_s,
         "heading_rms_deg": fit.heading_deg,
@@ -333,16 +301,16 @@ def check_response(boat: str, samples: Sequence[DrillSample], platform: Platform
         "turn_rate_foretold_dps": fit.foretold_dps,
         "changed_share": changed,
     }
-    away = any(_turned_away(measured[part], told[part]) for part in stretches)
-    fault = _fault(fit, delay_s, measured, away, platform)
     disturbed = f"; {100.0 * changed:.0f} % of its commands changed by the shield" if changed else ""
-    if fault and changed:
-        fault += f"{disturbed}: repeat it on clear water before you believe it"
-    text = fault or (
+    passed, text, _ = found(
         f"as {platform.name}: heading within {fit.heading_deg:.1f} deg rms, speed within {fit.speed_mps:.2f} m/s rms, "
-        f"effect after {delay_s:.2f} s{disturbed}{counted_words(delay_s, dt_s)}"
+        f"effect after {delay_s:.2f} s{disturbed}{counted_words(delay_s, dt_s)}",
+        figures,
+        *_faults(fit, delay_s, measured, any(_turned_away(measured[part], told[part]) for part in stretches), platform),
     )
-    return CheckResult(name, not fault, text, figures)
+    if not passed and changed:
+        text += f"{disturbed}: repeat it on clear water before you believe it"
+    return CheckResult(name, passed, text, figures)
 
 
 def counted_words(delay_s: float, dt_s: float) -> str:
@@ -372,13 +340,8 @@ def _fit(told: Sequence[DrillSample], measured: Array, platform: Platform, dt_s:
             error = _half_turn(math.degrees(command.heading_rad) - row[L.HEADING])
             step_boat(params, row, command.speed_mps, error, dt_s)
     heading = _half_turn(measured[:, 0] - foretold[:, 0])
-    speed = measured[:, 1] - foretold[:, 1]
-    return _Fit(
-        float(np.sqrt(np.mean(heading**2))),
-        float(np.sqrt(np.mean(speed**2))),
-        _fastest_dps(measured[:, 0], dt_s),
-        _fastest_dps(foretold[:, 0], dt_s),
-    )
+    rms = (float(np.sqrt(np.mean(off**2))) for off in (heading, measured[:, 1] - foretold[:, 1]))
+    return _Fit(*rms, _fastest_dps(measured[:, 0], dt_s), _fastest_dps(foretold[:, 0], dt_s))
 
 
 def _delay_s(costs: Sequence[float], dt_s: float) -> float:
@@ -397,40 +360,42 @@ def _fastest_dps(headings_deg: Array, dt_s: float) -> float:
     return float(np.abs(_half_turn(headings_deg[apart:] - headings_deg[:-apart])).max()) / (apart * dt_s)
 
 
-def _fault(fit: _Fit, delay_s: float, measured: Array, away: bool, platform: Platform) -> str:
-    if float(np.median(measured[:, 1])) < -0.2:
-        return "it goes astern when told to go ahead; check the motors' direction"
-    if away:
-        return "it turns away from the heading it is told; check the steering's direction"
+def _faults(fit: _Fit, delay_s: float, measured: Array, away: bool, platform: Platform) -> list[tuple[bool, str]]:
     slow = delay_s > LONGEST_DELAY_S and fit.measured_dps < SLOWER * fit.foretold_dps
-    if slow or not fit.heading_deg <= HEADING_DEG:
-        faster = "faster" if fit.measured_dps > fit.foretold_dps else "slower"
-        return (
-            f"it turns {faster} than {platform.name} ({fit.measured_dps:.0f} against {fit.foretold_dps:.0f} deg/s, "
-            f"{fit.heading_deg:.0f} deg rms); give the platform that fits it (steerclear fit LOG "
-            "--out boat.yaml, of a sea-trial's log), or tune its steering"
-        )
-    if not fit.speed_mps <= SPEED_MPS:
-        return (
-            f"its speed is {fit.speed_mps:.2f} m/s rms from {platform.name}'s; give the platform that fits it "
-            "(steerclear fit LOG --out boat.yaml, of a sea-trial's log), or tune its speed"
-        )
-    if delay_s > LONGEST_DELAY_S:
-        return f"commands take {delay_s:.1f} s to work; shorten the radio's way, or set shield.delay_s to that"
-    return ""
+    speed = "faster" if fit.measured_dps > fit.foretold_dps else "slower"
+    remedy = "give the platform that fits it (steerclear fit LOG --out boat.yaml, of a sea-trial's log), or tune its"
+    return [
+        (float(np.median(measured[:, 1])) < -0.2, "it goes astern when told to go ahead; check the motors' direction"),
+        (away, "it turns away from the heading it is told; check the steering's direction"),
+        (
+            slow or not fit.heading_deg <= HEADING_DEG,
+            f"it turns {speed} than {platform.name} ({fit.measured_dps:.0f} against {fit.foretold_dps:.0f} deg/s, "
+            f"{fit.heading_deg:.0f} deg rms); {remedy} steering",
+        ),
+        (
+            not fit.speed_mps <= SPEED_MPS,
+            f"its speed is {fit.speed_mps:.2f} m/s rms from {platform.name}'s; {remedy} speed",
+        ),
+        (
+            delay_s > LONGEST_DELAY_S,
+            f"commands take {delay_s:.1f} s to work; shorten the radio's way, or set shield.delay_s to that",
+        ),
+    ]
 
 
 def _stretches(told: Sequence[DrillSample], dt_s: float) -> list[slice]:
     """Where the drill's own command to go one way was sent for long enough without a break."""
-    found, begin = [], 0
+    stretches, begin = [], 0
     for i in range(len(told) + 1):
         on = i < len(told) and not told[i].changed and told[i].speed_mps > 0.0
-        if on and (i == begin or _apart(told[i], told[begin]) <= TURNED_DEG):
-            continue
+        if on:
+            turned_deg = abs(float(_half_turn(math.degrees(told[i].heading_rad - told[begin].heading_rad))))
+            if i == begin or turned_deg <= TURNED_DEG:
+                continue
         if (i - begin) * dt_s >= LONG_ENOUGH_S:
-            found.append(slice(begin, i))
+            stretches.append(slice(begin, i))
         begin = i if on else i + 1
-    return found
+    return stretches
 
 
 def _turned_away(measured: Array, told: Sequence[DrillSample]) -> bool:
@@ -438,10 +403,6 @@ def _turned_away(measured: Array, told: Sequence[DrillSample]) -> bool:
     wanted = math.degrees(told[-1].heading_rad)
     first, last = (abs(_half_turn(measured[i, 0] - wanted)) for i in (0, -1))
     return bool(last > first + TURNED_DEG)
-
-
-def _apart(one: DrillSample, other: DrillSample) -> float:
-    return abs(float(_half_turn(math.degrees(one.heading_rad - other.heading_rad))))
 
 
 def _half_turn(deg: Any) -> Any:

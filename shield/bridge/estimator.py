@@ -52,31 +52,22 @@ _SEEN = [L.X, L.Y, L.HEADING, L.SPEED]
 
 @dataclass(frozen=True)
 class Estimate:
-    """A boat of ours now.
+    """A boat of ours now."""
 
-    Attributes:
-        row: (N_STATE,) state and autopilot memory.
-        age_s: since the oldest of what it rests on was measured, s.
-        spread_m: half the distance between where it is if it heard the last commands and if it did not, m.
-    """
-
-    row: Array
-    age_s: float
-    spread_m: float
+    row: Array  # (N_STATE,) state and autopilot memory
+    age_s: float  # since the oldest of what it rests on was measured, s
+    spread_m: float  # half the distance between where it is if it heard the last commands and if it did not, m
 
 
 class Estimator:
-    """Follows one boat.
+    """Follows one boat, in steps of ``dt_s`` of the loop and the model.
+
+    The delay from sending a command to its effect is counted up to whole steps, as the shield counts it: with less a
+    command would be run here and by the shield once more.
 
     Attributes:
         still_since_s: when its source froze, s; inf: it did not.
         unseen_m: way it may have gone while its source repeated itself, m; counts until something changes.
-
-    Args:
-        platform: the boat's.
-        dt_s: step of the loop and the model, s.
-        delay_s: from sending a command to its effect, s; counted up to whole steps, as the shield counts it: with less
-            a command would be run here and by the shield once more.
     """
 
     def __init__(self, platform: Platform, dt_s: float, delay_s: float) -> None:
@@ -93,11 +84,6 @@ class Estimator:
         self._fixed_s = np.full(len(_SEEN), -math.inf)
         self._commands: deque[tuple[float, float, float]] = deque(maxlen=64)
         self._past: deque[tuple[float, Array]] = deque(maxlen=32)
-
-    @property
-    def known(self) -> bool:
-        """Whether there was ever a fix."""
-        return self._row is not None
 
     def estimate(self, now_s: float) -> Estimate | None:
         """The boat at the time of the last `advance`; None before the first fix."""
@@ -131,15 +117,11 @@ class Estimator:
 
     def correct(self, reading: BoatReading) -> None:
         """Take a reading, already found sensible, whose fields are all there."""
-        measured = _measured(reading)
         fixed_s = _times(reading)
-        if self._row is None:
-            self.start(reading)
-            return
-        fresh = fixed_s > self._fixed_s + 1e-6
-        difference = self._difference(measured, fixed_s)
-        difference[~fresh] = 0.0
-        if (np.abs(difference) > SURPRISE).any():
+        known = self._row is not None
+        difference = self._difference(_measured(reading), fixed_s) if known else np.zeros(len(_SEEN))
+        difference[fixed_s <= self._fixed_s + 1e-6] = 0.0
+        if self._row is None or (np.abs(difference) > SURPRISE).any():
             self.start(reading)
             return
         difference[np.abs(difference) <= ROUNDING] = 0.0
@@ -187,8 +169,9 @@ class Estimator:
 
     def start(self, reading: BoatReading) -> None:
         """Begin afresh where the reading says: the boat is taken to hold its course and speed."""
-        x, y, heading_deg, speed = _run_on(_measured(reading), reading.read_s - _times(reading))
-        row = fresh_state(x, y, heading_deg, speed)
+        x, y, heading_deg, speed = _measured(reading)
+        way, heading = speed * (reading.read_s - float(_times(reading)[0])), math.radians(heading_deg)
+        row = fresh_state(x + way * math.sin(heading), y + way * math.cos(heading), heading_deg, speed)
         row[L.THRUST] = thrust_at(self._params, speed)
         if self._turns_by_rate and math.isfinite(reading.turn_rate_rads):
             row[L.TURN_RATE] = math.degrees(reading.turn_rate_rads)
@@ -224,12 +207,10 @@ class Estimator:
 
     def _difference(self, measured: Array, fixed_s: Array) -> Array:
         """Measured less believed, each at the time it was measured."""
-        times = np.array([time for time, _ in self._past])
-        rows = np.array([row for _, row in self._past])
-        difference = np.zeros(len(_SEEN))
-        for k in range(len(_SEEN)):
-            column = np.unwrap(rows[:, k], period=360.0) if k == 2 else rows[:, k]
-            difference[k] = measured[k] - np.interp(fixed_s[k], times, column)
+        times, rows = np.array([time for time, _ in self._past]), np.array([row for _, row in self._past])
+        rows[:, 2] = np.unwrap(rows[:, 2], period=360.0)
+        believed = [np.interp(at_s, times, column) for at_s, column in zip(fixed_s, rows.T, strict=True)]
+        difference = measured - np.array(believed)
         difference[2] = (difference[2] + 180.0) % 360.0 - 180.0
         return difference
 
@@ -256,9 +237,3 @@ def _times(reading: BoatReading) -> Array:
     """When each of them was true, s."""
     ages = (reading.position_age_s, reading.position_age_s, reading.heading_age_s, reading.velocity_age_s)
     return reading.read_s - np.array(ages)
-
-
-def _run_on(seen: Array, age_s: Array) -> Array:
-    """The boat's values, run straight on by the age of its position."""
-    way, heading = seen[3] * age_s[0], math.radians(seen[2])
-    return seen + np.array([way * math.sin(heading), way * math.cos(heading), 0.0, 0.0])

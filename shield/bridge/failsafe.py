@@ -14,6 +14,7 @@ from ..platforms import Platform
 from ..platforms import layout as L
 from .failsafe_table import CONDITIONS, setting
 from .fleet_file import FleetFile
+from .fleet_settings import Geofence
 from .frame import TWO_PI
 from .messages import FAILSAFE, NEVER_S, Action, Alarm, Answer, BoatReading
 from .operator import Override
@@ -39,63 +40,41 @@ REST_MPS = 0.2
 
 @dataclass(frozen=True)
 class Seen:
-    """What one turn is held against, beside what the tracker knows.
-
-    Attributes:
-        now_s: time of the turn, s.
-        readings: of own boats.
-        answer: of the policy.
-        game_age_s: age of the state of the game, s; inf: none yet.
-        game_expected: whether there is to be a game at all.
-        game_over: whether the game has ended.
-        log_fault: why ticks can no longer be recorded; empty: they are.
-        overrides: in force.
-        alarms: what is wrong with those who tell where boats are.
-        outside_model_s: how long each own boat has been far outside its model, s.
-        decided: the last decisions; None: there were none.
-    """
+    """What one turn at ``now_s`` is held against, beside what the tracker knows."""
 
     now_s: float
-    readings: Mapping[str, BoatReading]
-    answer: Answer
-    game_age_s: float = NEVER_S
-    game_expected: bool = False
-    game_over: bool = False
-    log_fault: str = ""
-    overrides: tuple[Override, ...] = ()
-    alarms: tuple[Alarm, ...] = ()
+    readings: Mapping[str, BoatReading]  # of own boats
+    answer: Answer  # of the policy
+    game_age_s: float = NEVER_S  # age of the state of the game, s; inf: none yet
+    game_expected: bool = False  # whether there is to be a game at all
+    game_over: bool = False  # whether the game has ended
+    log_fault: str = ""  # why ticks can no longer be recorded; empty: they are
+    overrides: tuple[Override, ...] = ()  # in force
+    alarms: tuple[Alarm, ...] = ()  # what is wrong with those who tell where boats are
+    # how long each own boat has been far outside its model, s
     outside_model_s: Mapping[str, float] = field(default_factory=dict)
-    decided: Decisions | None = None
+    decided: Decisions | None = None  # the last decisions; None: there were none
 
 
 @dataclass
 class Verdict:
-    """What is due now.
+    """What is due now."""
 
-    Attributes:
-        actions: everything that took effect.
-        responses: strongest response due for each own boat; boats that have none are not in it.
-        unknown: own boats told to stop by their links, past the shield: their state is not known, or they were handed
-            over beyond the hard line.
-        idle: own boats that do not obey us now (another mode, disarmed): nothing is sent to them.
-        dropped: contacts the operator had left out.
-        retake: boats to be taken back now that the fail-safe that took them is over.
-    """
-
-    actions: list[Action] = field(default_factory=list)
+    actions: list[Action] = field(default_factory=list)  # everything that took effect
+    # strongest response due for each own boat; boats that have none are not in it
     responses: dict[str, str] = field(default_factory=dict)
+    # own boats told to stop by their links, past the shield: their state is not known, or they were handed over
+    # beyond the hard line
     unknown: set[str] = field(default_factory=set)
+    # own boats that do not obey us now (another mode, disarmed): nothing is sent to them
     idle: set[str] = field(default_factory=set)
-    dropped: set[str] = field(default_factory=set)
+    dropped: set[str] = field(default_factory=set)  # contacts the operator had left out
+    # boats to be taken back now that the fail-safe that took them is over
     retake: set[str] = field(default_factory=set)
 
 
 class Failsafe:
-    """Holds each turn against the table; remembers since when things are wrong, and who was handed over.
-
-    Args:
-        fleet: the file with the limits.
-        tracker: ages of navigation and contacts; its boats are those of this process.
+    """Holds each turn of the tracker's boats against the table; remembers since when things are wrong.
 
     Attributes:
         handed_over: boats stopped beyond the hard line, until somebody takes them.
@@ -131,31 +110,25 @@ class Failsafe:
             self._judge_alarm(alarm)
         if seen.game_over:
             self._due("game.over", "game", "the game is over")
-        elif (seen.game_expected or math.isfinite(seen.game_age_s)) and seen.game_age_s > self._after("game.old"):
+        elif (seen.game_expected or math.isfinite(seen.game_age_s)) and seen.game_age_s > self._after_s["game.old"]:
             self._due("game.old", "game", f"state of the game: {words(seen.game_age_s)}")
         if seen.log_fault:
             self._due("log", "log", f"black box: {seen.log_fault}")
         return self._verdict
 
-    def _after(self, name: str) -> float:
-        """The time of a row of the table, s."""
-        return self._after_s[name]
+    def _overridden(self, condition: str, subject: str) -> bool:
+        return any(entry.covers(condition, subject) for entry in self._seen.overrides)
 
     def _due(
         self, name: str, subject: str, text: str, boats: Collection[str] | None = None, response: str | None = None
     ) -> None:
-        """Note a row that took effect, unless it is overridden.
+        """Note a row of the table that took effect, unless it is overridden.
 
-        Args:
-            name: of the row.
-            subject: boat or contact it is about.
-            text: for a person.
-            boats: whom its response concerns; None: all of this process.
-            response: instead of the table's.
+        Its response, or the one given instead, concerns these boats; None: all of this process.
         """
         condition = name.partition(".")[0]
         if response is None:
-            if any(entry.covers(condition, subject) for entry in self._seen.overrides):
+            if self._overridden(condition, subject):
                 return
             response = self._responses[name]
         self._verdict.actions.append(Action(subject, condition, response, text))
@@ -165,21 +138,21 @@ class Failsafe:
                 self._verdict.responses[boat] = response
 
     def _judge_own(self, boat: str, reading: BoatReading) -> None:
-        tracker, limits = self._tracker, self._fleet.limits
+        tracker, limits, after = self._tracker, self._fleet.limits, self._after_s
         if reading.released:  # it stays his who took it, heard or not
             self.handed_over.discard(boat)
             self._leave(boat, reading)
             return
         age, known, silent = tracker.navigation_age_s(boat), tracker.known_age_s(boat), reading.silent_s
         why = f" ({tracker.faults[boat]})" if boat in tracker.faults else ""
-        if max(known, silent) > self._after("navigation.lost"):
+        if max(known, silent) > after["navigation.lost"]:
             self._verdict.unknown.add(boat)
             what = "position unknown" if known > limits.navigation.lost_after_s else "no longer reached"
             self._due("navigation.lost", boat, f"{boat}: {what}, {words(age)}{why}; told to stop", (boat,))
-        elif age > self._after("navigation.old"):
+        elif age > after["navigation.old"]:
             feed = ", known from the feed" if known < age else ""
             self._due("navigation.old", boat, f"{boat}: own navigation {words(age)}{why}{feed}", (boat,))
-        if silent > self._after("link"):
+        if silent > after["link"]:
             self._due("link", boat, f"{boat}: link silent, {words(silent)}", (boat,))
         elif not reading.ready:
             self._leave(boat, reading)
@@ -188,9 +161,9 @@ class Failsafe:
         if self._seen.now_s - self._rivals_s.get(boat, -math.inf) <= RIVAL_S:
             self._due("commander", boat, f"{boat}: somebody else commands it too", (boat,))
         off_s = self._seen.outside_model_s.get(boat, 0.0)
-        if off_s >= self._after("model.off"):
+        if off_s >= after["model.off"]:
             text = f"{boat} is more than {limits.model.outside_m:g} m from where its platform says, for {off_s:.0f} s"
-            given_up = off_s >= self._after("model.given_up")
+            given_up = off_s >= after["model.given_up"]
             text += ": handed over, take it by hand, and fit its platform anew" if given_up else ""
             self._due("model.given_up" if given_up else "model.off", boat, text, (boat,))
         self._judge_place(boat)
@@ -208,23 +181,18 @@ class Failsafe:
 
     def _judge_place(self, boat: str) -> None:
         """Outside the operating area: how far, since when, and why it does not come back."""
-        track, now_s = self._tracker.track(boat), self._seen.now_s
-        outside_m = 0.0 if track is None else outside_of(self._fleet.geofence.box, track.row[L.X], track.row[L.Y])
+        track, now_s, decided = self._tracker.track(boat), self._seen.now_s, self._seen.decided
+        outside_m = 0.0 if track is None else self._fleet.geofence.outside_m(track.row[L.X], track.row[L.Y])
         if outside_m <= 0.0:
             self._outside_s.pop(boat, None)
         else:
-            since_s, why = now_s - self._outside_s.setdefault(boat, now_s), ""
-            decided = self._seen.decided
+            text = f"{boat} is {outside_m:.1f} m outside the geofence"
+            text += f", for {now_s - self._outside_s.setdefault(boat, now_s):.0f} s"
             if decided is not None and boat in decided.fleet.names:
                 last = decided[decided.fleet.names.index(boat)]
-                why = (
-                    f": it keeps clear of {', '.join(last.active_constraints)}"
-                    if last.intervened and last.active_constraints
-                    else ""
-                )
-            self._due(
-                "geofence", boat, f"{boat} is {outside_m:.1f} m outside the geofence, for {since_s:.0f} s{why}", (boat,)
-            )
+                if last.intervened and last.active_constraints:
+                    text += f": it keeps clear of {', '.join(last.active_constraints)}"
+            self._due("geofence", boat, text, (boat,))
         if boat in self.handed_over:
             self._verdict.unknown.add(boat)
             text = f"{boat} went beyond the hard line: stopped by its link, handed over; bring it in by hand, then take"
@@ -251,26 +219,23 @@ class Failsafe:
 
     def _judge_policy(self, boat: str, is_usable: bool, fault: str) -> None:
         age = self._seen.now_s - self._good_s.get(boat, -math.inf)
-        if is_usable and age <= self._after("policy.old"):
+        if is_usable and age <= self._after_s["policy.old"]:
             return
         last = f"no usable command of the policy, last {words(age)}"
-        text = (
-            f"{boat}: {last if math.isfinite(age) else 'no answer of the policy yet'}{f' ({fault})' if fault else ''}"
-        )
-        overridden = any(entry.covers("policy", boat) for entry in self._seen.overrides)
-        name = "policy.given_up" if age > self._after("policy.given_up") else "policy.old"
-        self._due(name, boat, text, (boat,), response="stop" if overridden else None)
+        text = f"{boat}: {last if math.isfinite(age) else 'no answer of the policy yet'}"
+        name = "policy.given_up" if age > self._after_s["policy.given_up"] else "policy.old"
+        response = "stop" if self._overridden("policy", boat) else None
+        self._due(name, boat, f"{text} ({fault})" if fault else text, (boat,), response)
 
     def _judge_contact(self, boat: str) -> None:
         age = self._tracker.contact_age_s(boat)
-        lost = age > self._after("contact.lost")
-        if age <= self._after("contact.old"):
+        if age <= self._after_s["contact.old"]:
             return
-        if lost and any(entry.covers("contact", boat) for entry in self._seen.overrides):
+        state = "lost" if age > self._after_s["contact.lost"] else "old"
+        if state == "lost" and self._overridden("contact", boat):
             self._verdict.dropped.add(boat)
         why = f" ({self._tracker.faults[boat]})" if boat in self._tracker.faults else ""
-        text = f"contact {boat} {'lost' if lost else 'old'}: {words(age)}{why}"
-        self._due("contact.lost" if lost else "contact.old", boat, text)
+        self._due(f"contact.{state}", boat, f"contact {boat} {state}: {words(age)}{why}")
 
     def _judge_alarm(self, alarm: Alarm) -> None:
         """Sources that contradict each other: all stories are kept clear of, or boats stop where there are too many.
@@ -278,8 +243,7 @@ class Failsafe:
         Of an own boat its own link tells: there it is only said.
         """
         subject = alarm.boat or "feed"
-        overridden = any(entry.covers("contact", alarm.boat) for entry in self._seen.overrides)
-        if alarm.boat in self._boats or overridden:
+        if alarm.boat in self._boats or self._overridden("contact", alarm.boat):
             self._due("contact.doubt", subject, f"{subject}: {alarm.text}", (), response="none")
             return
         what = ", so nobody knows where it is" if alarm.lost else ""
@@ -288,15 +252,10 @@ class Failsafe:
 
 
 class Responder:
-    """Turns responses of one boat into nominal commands; remembers where each began.
+    """Turns responses of one boat into nominal commands; remembers where each began."""
 
-    Args:
-        platform: the boat's.
-        box: the water it may not leave: xmin, ymin, xmax, ymax, m.
-    """
-
-    def __init__(self, platform: Platform, box: tuple[float, float, float, float]) -> None:
-        self._top_mps, self._box = platform.max_speed_mps, box
+    def __init__(self, platform: Platform, fence: Geofence) -> None:
+        self._top_mps, self._box = platform.max_speed_mps, fence.box
         self._response = ""
         self._onset: Array | None = None
 
@@ -305,12 +264,7 @@ class Responder:
         self._onset = None
 
     def wanted(self, response: str, row: Array) -> tuple[float, float]:
-        """Speed, m/s, and absolute heading, rad, that a response asks for.
-
-        Args:
-            response: one of `STRENGTH`, but "go_on".
-            row: (N_STATE,) the boat now.
-        """
+        """Speed, m/s, and absolute heading, rad, that a response (not "go_on") asks of the boat as it is."""
         if self._onset is None or self._response != response:
             self._response, self._onset = response, row.copy()
         onset = self._onset
@@ -342,12 +296,6 @@ def _rest(row: Array) -> tuple[float, float]:
     again, for which it takes thrust, and never come to rest.
     """
     return 0.0, math.radians(float(row[L.HEADING])) % TWO_PI
-
-
-def outside_of(box: tuple[float, float, float, float], x_m: float, y_m: float) -> float:
-    """How far outside a box a point is, m; negative: how far inside; NaN stays NaN."""
-    dx, dy = max(box[0] - x_m, x_m - box[2]), max(box[1] - y_m, y_m - box[3])
-    return math.hypot(dx, dy) if min(dx, dy) > 0.0 else max(dx, dy)
 
 
 def at_rest(readings: Mapping[str, BoatReading]) -> bool:

@@ -11,28 +11,17 @@ from .fleet_settings import End, Limits
 
 
 class Condition(NamedTuple):
-    """A row.
+    """A row."""
 
-    Attributes:
-        name: of `Action.condition`; the part before a dot where several rows are of one kind.
-        happens: what is wrong.
-        seen: how it is noticed.
-        within: within what time.
-        response: what is done.
-        returns: how control comes back.
-        disables: what an override of it switches off; empty: it cannot be overridden.
-    """
-
-    name: str
-    happens: str
-    seen: str
-    within: str
-    response: str
-    returns: str
-    disables: str = ""
+    name: str  # of `Action.condition`; the part before a dot where several rows are of one kind
+    happens: str  # what is wrong
+    seen: str  # how it is noticed
+    response: str  # what is done
+    within: str = "1 turn"  # within what time
+    returns: str = "by itself, in the first turn without it"  # how control comes back
+    disables: str = ""  # what an override of it switches off; empty: it cannot be overridden
 
 
-_BY_ITSELF = "by itself, in the first turn without it"
 _BY_KEY = "the operator takes it back"
 _LINKS_STOP = "its link's own stop"
 
@@ -43,179 +32,174 @@ CONDITIONS = {
             "navigation.old",
             "A boat's own telemetry is old or refused: a jump, a frozen or impossible place, no GPS fix.",
             "age of its position, heading and speed",
-            "`navigation.max_age_s`",
             "`navigation.then`, steered by its model behind the shield; the feed stands in where it knows the boat",
-            _BY_ITSELF,
+            within="`navigation.max_age_s`",
         ),
         Condition(
             "navigation.lost",
             "Nobody knows where a boat of ours is.",
             "the same age, and the feed's",
-            "`navigation.lost_after_s`",
             "its link's own stop; the others keep clear of where it may be",
-            _BY_ITSELF,
+            within="`navigation.lost_after_s`",
         ),
         Condition(
             "link",
             "Nothing comes from a boat.",
             "age of its newest packet",
-            "`link.max_age_s`",
             "`link.then`; its autopilot stops it 3 s after the last command it hears",
-            _BY_ITSELF,
+            within="`link.max_age_s`",
         ),
         Condition(
             "mode.pilot",
             "A pilot takes a boat, or disarms it.",
             "its heartbeat",
-            "0.5 s",
             "nothing is sent to it; the others keep clear of it",
-            _BY_KEY,
+            within="0.5 s",
+            returns=_BY_KEY,
         ),
         Condition(
             "mode.failsafe",
             "The autopilot's own fail-safe takes a boat.",
             "its heartbeat, and the autopilot's word in the same seconds",
-            "0.5 s",
             "nothing is sent to it; the others keep clear of it",
-            "once the autopilot says it is over: wait (the operator takes it back) or retake; now `after_failsafe`",
+            within="0.5 s",
+            returns=(
+                "once the autopilot says it is over: wait (the operator takes it back) or retake; now `after_failsafe`"
+            ),
         ),
         Condition(
             "commander",
             "Somebody else commands a boat of ours.",
             "packets on its link, and answers to commands that are not ours",
-            "1 turn",
             "`link.then`, until 2 s after the last of them",
-            _BY_ITSELF,
-            "the response to a second commander; both steer the boat",
+            disables="the response to a second commander; both steer the boat",
         ),
         Condition(
             "model.off",
             "A boat is farther than `model.outside_m` from where its model has it 2 s ahead.",
             "prediction against telemetry; its margin grows from the first error on",
-            "`model.after_s`",
             "`model.then`",
-            _BY_ITSELF,
-            "the response to a boat far outside its model; the shield foretells it wrongly",
+            within="`model.after_s`",
+            disables="the response to a boat far outside its model; the shield foretells it wrongly",
         ),
         Condition(
             "model.given_up",
             "The same for longer.",
             "likewise",
-            "`model.give_up_after_s`",
             "`model.give_up_then`: take it by hand, and fit its platform anew",
-            _BY_ITSELF,
+            within="`model.give_up_after_s`",
         ),
         Condition(
             "geofence",
             "A boat is outside the operating area.",
             "its position",
-            "1 turn",
             "`geofence.then`",
-            "by itself, inside",
-            "the response to leaving the geofence; the shield still turns boats back at the edge",
+            returns="by itself, inside",
+            disables="the response to leaving the geofence; the shield still turns boats back at the edge",
         ),
         Condition(
             "hard_line",
             "A boat is beyond the hard line, with geofence then: stop.",
             "the shield's decision",
-            "1 turn",
             "its link's own stop every turn; it is handed over to the pilot",
-            "the pilot brings it in, then the operator takes it back",
+            returns="the pilot brings it in, then the operator takes it back",
         ),
         Condition(
             "obstacle",
             "No command would keep a boat off a shore or an obstacle but to stop.",
             "the shield's decision",
-            "1 turn",
             _LINKS_STOP,
-            "by itself, with a command that stays clear",
+            returns="by itself, with a command that stays clear",
         ),
         Condition(
             "policy.old",
             "The policy's answer is old or unusable.",
             "its age and its values",
-            "`policy.max_age_s`",
             "`policy.then`",
-            _BY_ITSELF,
-            "the response to an old or unusable policy; the boat stands by with no speed instead",
+            within="`policy.max_age_s`",
+            disables="the response to an old or unusable policy; the boat stands by with no speed instead",
         ),
         Condition(
             "policy.given_up",
             "The same for longer.",
             "likewise",
-            "`policy.give_up_after_s`",
             "`policy.give_up_then`",
-            _BY_ITSELF,
+            within="`policy.give_up_after_s`",
         ),
         Condition(
             "contact.old",
             "Another boat's position is old.",
             "age of its newest fix, by any source",
-            "`contact.max_age_s`",
             "`contact.then`, all boats of ours; the room it may be in grows",
-            _BY_ITSELF,
-            "the response to an old or lost contact; once it is lost, boats no longer keep clear of it",
+            within="`contact.max_age_s`",
+            disables="the response to an old or lost contact; once it is lost, boats no longer keep clear of it",
         ),
         Condition(
             "contact.lost",
             "Another boat is lost.",
             "likewise",
-            "`contact.lost_after_s`",
             "`contact.lost_then`, all boats of ours",
-            _BY_ITSELF,
+            within="`contact.lost_after_s`",
         ),
         Condition(
             "contact.doubt",
             "Sources contradict each other about another boat.",
             "places that cannot be one boat's, two programs under one name",
-            "1 turn",
             "`contact.then`, and every place told is kept clear of; `contact.lost_then` where more than 3 are told",
-            _BY_ITSELF,
         ),
         Condition(
             "game.old",
             "The referee is silent.",
             "age of the state of the game",
-            "`game.max_age_s`",
             "`game.then`",
-            _BY_ITSELF,
-            "the response to an old state of the game; the policy goes on with what it last saw",
+            within="`game.max_age_s`",
+            disables="the response to an old state of the game; the policy goes on with what it last saw",
         ),
-        Condition("game.over", "The game is over.", "the referee's word", "1 turn", "hold_station", "a new game"),
+        Condition(
+            "game.over",
+            "The game is over.",
+            "the referee's word",
+            "hold_station",
+            returns="a new game",
+        ),
         Condition(
             "log",
             "The black box cannot be written.",
             "the disk's answer",
-            "1 s; 10 s where the disk only hangs",
             "`log.then`",
-            _BY_ITSELF,
-            "the response to a black box that cannot be written; what follows is not recorded",
+            within="1 s; 10 s where the disk only hangs",
+            disables="the response to a black box that cannot be written; what follows is not recorded",
         ),
         Condition(
             "decision",
             "The shield cannot decide, or a turn breaks.",
             "any error",
-            "the same turn",
             "the links' own stop, all boats",
-            _BY_ITSELF,
+            within="the same turn",
         ),
-        Condition("send", "A command is no number.", "the link refuses it", "the same turn", _LINKS_STOP, _BY_ITSELF),
+        Condition(
+            "send",
+            "A command is no number.",
+            "the link refuses it",
+            _LINKS_STOP,
+            within="the same turn",
+        ),
         Condition(
             "stop_all",
             "STOP ALL.",
             "the operator's key",
-            "1 turn",
             "stop, through the shield; asked for twice: the links' own stop, past the shield",
-            "the operator resumes",
+            returns="the operator resumes",
         ),
         Condition(
             "end",
             "The run ends.",
             "key, signal or time",
-            "1 turn",
-            "stop, through the shield, until all lie still and nobody comes near, for at most `end.longest_s`; then "
-            "HOLD, verified",
-            "a new start",
+            (
+                "stop, through the shield, until all lie still and nobody comes near, for at most `end.longest_s`; "
+                "then HOLD, verified"
+            ),
+            returns="a new start",
         ),
     )
 }
@@ -236,9 +220,7 @@ def setting(key: str, limits: Limits, end: End) -> Any:
 def response_table(limits: Limits | None = None, end: End | None = None) -> list[tuple[str, ...]]:
     """Rows for a person: what happens, how it is seen, within what time, what is done, how control returns.
 
-    Args:
-        limits: of a file; None: the defaults.
-        end: likewise.
+    With the times and responses of a file's limits and end; None: the defaults.
     """
 
     def filled(text: str) -> str:
@@ -250,7 +232,7 @@ def response_table(limits: Limits | None = None, end: End | None = None) -> list
             parts[k] = f"{shown} (`{parts[k]}`)"
         return "".join(parts)
 
-    return [tuple(map(filled, row[1:6])) for row in CONDITIONS.values()]
+    return [tuple(map(filled, (r.happens, r.seen, r.within, r.response, r.returns))) for r in CONDITIONS.values()]
 
 
 def response_page() -> str:

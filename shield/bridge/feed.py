@@ -17,17 +17,29 @@ import time
 from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
-from types import TracebackType
 
-from ..compat import Self
 from ..exceptions import BridgeError, ConfigError, FeedError
 from .clock import Clock
-from .feed_packets import MAX_BYTES, SEAL_BYTES, Fix, Packet, Seal, is_sealed, parse_packet
-from .feed_sender import FeedSender, PositionPublisher, family_of, socket_address
+from .feed_packets import (
+    MAX_BYTES,
+    SEAL_BYTES,
+    BoatStatus,
+    FeedSender,
+    Fix,
+    FlagStatus,
+    GameState,
+    Packet,
+    PositionPublisher,
+    Seal,
+    family_of,
+    game_state,
+    is_sealed,
+    parse_packet,
+    socket_address,
+)
 from .frame import FieldFrame
-from .game_state import BoatStatus, FlagStatus, GameState, game_state
 from .mavlink.signing import NEW_STREAM_S, TICKS_PER_S, SigningClock
-from .messages import TELEMETRY, Alarm, Contact
+from .messages import TELEMETRY, Alarm, Closing, Contact
 
 __all__ = [
     "BoatStatus",
@@ -86,7 +98,7 @@ class _Sender:
     late_s: float = 0.0
 
 
-class FeedReceiver:
+class FeedReceiver(Closing):
     """Hears the feed on a socket of its own, in a thread of its own. A `ContactSource`; a context manager.
 
     The age of a fix is counted on our clock from its receipt, plus the age its sender declared, plus, where packets are
@@ -185,31 +197,27 @@ class FeedReceiver:
         """Take one datagram as if it had come from ``host``; never raises on what is in it."""
         now_s = self._clock.now_s()
         if not self._is_allowed(host):
-            self._refuse("foreign", f"packet from {host}, which feed.allow does not name")
-            return
-        kind = self._seal_fault(data)
-        if kind:
-            self._refuse(kind, f"{host}: {_SEAL_TEXTS[kind]}")
-            return
+            return self._refuse("foreign", f"packet from {host}, which feed.allow does not name")
+        if kind := self._seal_fault(data):
+            return self._refuse(kind, f"{host}: {_SEAL_TEXTS[kind]}")
         try:
             packet = parse_packet(data if self._seal is None else data[:-SEAL_BYTES])
         except FeedError as error:
-            self._refuse("malformed", f"{host}: {error}")
-            return
+            return self._refuse("malformed", f"{host}: {error}")
         kind, text = self._problem(packet, now_s)
-        source = packet.sender
-        if kind:
-            self._refuse(kind, text)
-            if kind not in ("second run", "second referee"):
-                return
-            source = (
-                f"{packet.sender} (run {packet.run})"  # not the sender we know, but it may be the one that is right
-            )
+        source, late_s = packet.sender, 0.0
+        if kind in ("second run", "second referee"):  # not the sender we know, but it may be the one that is right
+            source = f"{packet.sender} (run {packet.run})"
             with self._lock:
                 self._rival = (text, now_s)
+        if kind:
+            self._refuse(kind, text)
+            if source == packet.sender:
+                return None
+        else:
+            late_s = self._senders[packet.sender].late_s
         for text in packet.refused:
             self._refuse("fix", f"{packet.sender}: {text}")
-        late_s = 0.0 if kind else self._senders[packet.sender].late_s
         if late_s > LATE_S:
             self._refuse("late", f"packets of {packet.sender} come {late_s:.1f} s late: what is in them is as old")
         if packet.game is not None and not kind:
@@ -217,6 +225,7 @@ class FeedReceiver:
                 self._game, self._game_s = packet.game, now_s - late_s
         for fix in packet.fixes:
             self._take_fix(fix, source, now_s, late_s)
+        return None
 
     def close(self) -> None:
         """Give the socket back; may be called again."""
@@ -228,14 +237,6 @@ class FeedReceiver:
         faults, closed, self._closed = self.faults(), self._closed, True
         if faults and not closed:
             LOG.warning("feed: refused in all: %s", ", ".join(f"{count} {kind}" for kind, count in faults.items()))
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _hear(self) -> None:
         while not self._closing.is_set():
@@ -324,10 +325,9 @@ class FeedReceiver:
             if now_s - self._senders[silent].heard_s < GONE_S:
                 silent = max(reversed(self._senders), key=lambda other: self._senders[other].first_s)
             del self._senders[silent]
-        furthest_s = -math.inf
+        furthest_s = ahead_s
         if known is not None and known.run == packet.run:
-            furthest_s = known.ahead_s - DRIFT * max(now_s - known.heard_s, 0.0)
-        furthest_s = max(ahead_s, furthest_s)
+            furthest_s = max(ahead_s, known.ahead_s - DRIFT * max(now_s - known.heard_s, 0.0))
         late_s = furthest_s - ahead_s if math.isfinite(ahead_s) else 0.0
         first_s = now_s if known is None else known.first_s
         self._senders[name] = _Sender(packet.run, packet.seq, packet.stamp or 0, first_s, now_s, furthest_s, late_s)
@@ -337,12 +337,10 @@ class FeedReceiver:
     def _take_fix(self, fix: Fix, source: str, now_s: float, late_s: float) -> None:
         has_room = fix.boat in self._told or len(self._told) < MAX_BOATS_TOLD
         if not (has_room if self._boats is None else fix.boat in self._boats):
-            self._refuse("unknown boat", f"{source}: boat {fix.boat} is not of this fleet")
-            return
+            return self._refuse("unknown boat", f"{source}: boat {fix.boat} is not of this fleet")
         x_m, y_m = self._frame.to_field_m(fix.latitude_deg, fix.longitude_deg)
         if not math.hypot(x_m, y_m) <= FAR_M:
-            self._refuse("fix", f"{source}: {fix.boat} is {math.hypot(x_m, y_m) / 1e3:.0f} km from the field")
-            return
+            return self._refuse("fix", f"{source}: {fix.boat} is {math.hypot(x_m, y_m) / 1e3:.0f} km from the field")
         heading_rad = self._frame.heading_to_field_rad(math.radians(fix.heading_deg))
         fixed_s = now_s - fix.age_s - late_s
         contact = Contact(fix.boat, (x_m, y_m), heading_rad, fix.speed_mps, fixed_s, fix.error_m, source)
@@ -355,6 +353,7 @@ class FeedReceiver:
                     silent = next(reversed(words))
                 del words[silent]
             words[source] = (contact, now_s)
+        return None
 
     def _refuse(self, kind: str, text: str, times: int = 1) -> None:
         with self._lock:
@@ -363,6 +362,23 @@ class FeedReceiver:
             self._texts[kind] = text
         if first:
             LOG.warning("feed: %s; more of this kind is only counted", text)
+
+
+class Budget:
+    """Lets through so many events a second on average, and that many at once."""
+
+    def __init__(self, per_s: float) -> None:
+        self._per_s, self._left, self._at_s = per_s, per_s, -math.inf
+
+    def take(self, now_s: float, cost: float = 1.0) -> bool:
+        """Whether one more event of that cost, in events, fits now."""
+        if now_s > self._at_s:
+            self._left = min(self._per_s, self._left + (now_s - self._at_s) * self._per_s)
+            self._at_s = now_s
+        if self._left < cost:
+            return False
+        self._left -= cost
+        return True
 
 
 def _hearing_socket(listen: str) -> socket.socket:
@@ -386,24 +402,3 @@ def _network_of(host: str) -> ipaddress.IPv4Network | ipaddress.IPv6Network:
         return ipaddress.ip_network("127.0.0.1" if host == "localhost" else host, strict=False)
     except ValueError:
         raise ConfigError(f"{host!r} is no host to allow; give an address such as 127.0.0.1, or a network") from None
-
-
-class Budget:
-    """Lets through so many events a second on average, and that many at once.
-
-    Args:
-        per_s: events a second.
-    """
-
-    def __init__(self, per_s: float) -> None:
-        self._per_s, self._left, self._at_s = per_s, per_s, -math.inf
-
-    def take(self, now_s: float, cost: float = 1.0) -> bool:
-        """Whether one more event of that cost, in events, fits now."""
-        if now_s > self._at_s:
-            self._left = min(self._per_s, self._left + (now_s - self._at_s) * self._per_s)
-            self._at_s = now_s
-        if self._left < cost:
-            return False
-        self._left -= cost
-        return True

@@ -1,4 +1,4 @@
-"""Packets of the position and game feed: one JSON object per UDP datagram, every check on it, and its seal.
+"""Packets of the position and game feed, one JSON object per UDP datagram: every check on them, their seal, who sends.
 
 A packet of kind "positions" says where boats are (`Fix`), one of kind "game" how the game stands (`GameState`).
 A sealed packet is the object, a line break, ``hmac-sha256:`` and the HMAC-SHA256 of the object's bytes in 64
@@ -10,14 +10,25 @@ from __future__ import annotations
 
 import hmac
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Annotated, Any, NoReturn
+import logging
+import math
+import random
+import socket
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Annotated, Any, Literal, NoReturn, Protocol
 
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import AfterValidator, Field, TypeAdapter, ValidationError
 
 from ..exceptions import ConfigError, FeedError
-from .game_state import MOST_BOATS, GameState, check_name, fault_of, game_state, short
+from .frame import FieldFrame
+from .mavlink.signing import SigningClock
+from .messages import Closing, Tick
+
+LOG = logging.getLogger(__name__)
+
+PUBLISH_EVERY = 2
+"""Every second tick's positions are published."""
 
 KEY_BYTES = 32
 PURPOSE = b"steerclear feed 1"
@@ -26,6 +37,7 @@ SEAL_BYTES = len(_MARK) + _DIGITS
 
 MAX_BYTES = 32768
 """Largest datagram taken."""
+MOST_BOATS = 64
 
 _FAR_OUT = frozenset({655.35, 6553.5, 65535.0})
 """16 bits of ones, in the units boats and receivers use: not available."""
@@ -40,51 +52,98 @@ NOT_AVAILABLE: Mapping[str, frozenset[float]] = {
 """What AIS, GPS receivers and autopilots say for a value they do not know, of each field."""
 
 
+def _printable(name: str) -> str:
+    if not name.isprintable():
+        raise ValueError("it holds a character that cannot be seen")
+    return name
+
+
+def _real(low: float, high: float) -> Any:
+    return Field(strict=True, ge=low, le=high)
+
+
+Name = Annotated[str, Field(strict=True, min_length=1, max_length=64), AfterValidator(_printable)]
+Text = Annotated[str, Field(strict=True)]
+Flag = Annotated[bool, Field(strict=True)]
+Count = Annotated[int, Field(strict=True, ge=0, lt=2**63)]
+Duration = Annotated[float, _real(0.0, 1e9)]
+Metres = Annotated[float, _real(-1e9, 1e9)]
+
+
+@dataclass(frozen=True)
+class BoatStatus:
+    """What the game says of one boat; names as in `steerclear.env`."""
+
+    tagged: Flag
+    has_flag: Flag
+    oob: Flag
+    on_side: Flag
+    cooldown_s: Duration
+    driven: Flag
+
+
+@dataclass(frozen=True)
+class FlagStatus:
+    """One team's flag: where it is, m in the field, and whether an opponent carries it."""
+
+    x_m: Metres
+    y_m: Metres
+    taken: Flag
+
+
+@dataclass(frozen=True)
+class GameState:
+    """How the game stands; pairs are blue, red."""
+
+    time_s: Duration  # since the game began, s
+    boats: Annotated[Mapping[Name, BoatStatus], Field(max_length=MOST_BOATS)]  # status of each boat by its name
+    flags: tuple[FlagStatus, FlagStatus]  # the two flags
+    captures: tuple[Count, Count] = (0, 0)  # counts of each team
+    grabs: tuple[Count, Count] = (0, 0)
+    tags: tuple[Count, Count] = (0, 0)
+    over: Flag = False  # whether the game has ended
+    note: Text = ""  # what the referee has to say, such as whom it waits for
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, as the feed and the black box have them."""
+        return {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(self).items()}
+
+
+class GameSource(Protocol):
+    """Gives the latest state of the game; never waits."""
+
+    def game(self) -> GameState | None:
+        """None: none yet."""
+
+    def game_age_s(self) -> float:
+        """Its age, s; inf: none yet."""
+
+
 @dataclass(frozen=True)
 class Fix:
-    """Where a sender says a boat is.
+    """Where a sender says a boat is."""
 
-    Attributes:
-        boat: its name.
-        latitude_deg, longitude_deg: WGS 84, deg.
-        heading_deg: true course, deg clockwise from north; more than -360, less than 360.
-        speed_mps: along the heading, m/s.
-        age_s: how old the fix was when it was sent, s.
-        error_m: bound of the position's error, m.
-    """
-
-    boat: str
-    latitude_deg: Annotated[float, Field(strict=True, ge=-89.0, le=89.0)]
-    longitude_deg: Annotated[float, Field(strict=True, ge=-180.0, le=180.0)]
-    heading_deg: Annotated[float, Field(strict=True, ge=-360.0, le=360.0)]
-    speed_mps: Annotated[float, Field(strict=True, ge=-50.0, le=50.0)]
-    age_s: Annotated[float, Field(strict=True, ge=0.0, le=3600.0)]
-    error_m: Annotated[float, Field(strict=True, ge=0.0, le=1000.0)]
-
-
-_READER = TypeAdapter(Fix)
+    boat: Name
+    latitude_deg: Annotated[float, _real(-89.0, 89.0)]  # WGS 84, deg
+    longitude_deg: Annotated[float, _real(-180.0, 180.0)]
+    # true course, deg clockwise from north; more than -360, less than 360
+    heading_deg: Annotated[float, _real(-360.0, 360.0)]
+    speed_mps: Annotated[float, _real(-50.0, 50.0)]  # along the heading, m/s
+    age_s: Annotated[float, _real(0.0, 3600.0)]  # how old the fix was when it was sent, s
+    error_m: Annotated[float, _real(0.0, 1000.0)]  # bound of the position's error, m
 
 
 @dataclass(frozen=True)
 class Packet:
-    """One datagram.
+    """One datagram."""
 
-    Attributes:
-        sender: who sent it.
-        run: number the sender drew when it started; 0 when it gives none.
-        seq: counts the sender's packets.
-        fixes: positions of a packet of kind "positions".
-        game: of a packet of kind "game".
-        refused: why single fixes of the packet were left out, a line each.
-        stamp: when it was sent, in 10 us since 1 January 2015, of packets that are sealed; None: it has none.
-    """
-
-    sender: str
-    run: int
-    seq: int
-    fixes: tuple[Fix, ...] = ()
-    game: GameState | None = None
-    refused: tuple[str, ...] = ()
+    sender: str  # who sent it
+    run: int  # number the sender drew when it started; 0 when it gives none
+    seq: int  # counts the sender's packets
+    fixes: tuple[Fix, ...] = ()  # positions of a packet of kind "positions"
+    game: GameState | None = None  # of a packet of kind "game"
+    refused: tuple[str, ...] = ()  # why single fixes of the packet were left out, a line each
+    # when it was sent, in 10 us since 1 January 2015, of packets that are sealed; None: it has none
     stamp: int | None = None
 
     def encode(self) -> bytes:
@@ -108,6 +167,106 @@ class Packet:
         if len(data) > most:
             raise FeedError(f"the packet has {len(data)} bytes; send fewer boats at once, {most} bytes at most")
         return data
+
+
+@dataclass(frozen=True)
+class _Head:
+    """What every packet begins with."""
+
+    steerclear: Annotated[float, _real(1, 1)]
+    kind: Literal["positions", "game"]
+    sender: Name
+    seq: Count
+    run: Count = 0
+    stamp: Count = -1
+    contacts: Annotated[list[Any], Field(max_length=MOST_BOATS)] | None = None
+
+
+_HEAD, _FIX, _GAME = TypeAdapter(_Head), TypeAdapter(Fix), TypeAdapter(GameState)
+
+
+def parse_packet(data: bytes) -> Packet:
+    """The packet in a datagram. A fix that cannot be used is left out and named; anything else wrong refuses it all.
+
+    Raises:
+        FeedError: it is too long, no JSON, of another version or kind, or a value is missing, not finite or absurd.
+    """
+    if len(data) > MAX_BYTES:
+        raise FeedError(f"packet of {len(data)} bytes; {MAX_BYTES} at most")
+    try:
+        content = json.loads(data, parse_constant=_refuse_constant)
+        head = _HEAD.validate_python(content)
+    except ValidationError as error:
+        raise FeedError(f"packet's {_fault(error)}") from None
+    except (ValueError, RecursionError) as error:
+        raise FeedError(f"packet is not JSON ({short(error)})") from None
+    stamp = None if head.stamp < 0 else head.stamp
+    if head.kind == "game":
+        game = game_state(content)
+        return Packet(head.sender, head.run, head.seq, game=replace(game, note=game.note[:200]), stamp=stamp)
+    if head.contacts is None:
+        raise FeedError("packet's contacts are missing; give a list of boats")
+    fixes: dict[str, Fix] = {}
+    refused = []
+    for entry in head.contacts:
+        try:
+            fix = _fix(entry)
+        except FeedError as error:
+            refused.append(str(error))
+            continue
+        if fix.boat in fixes:
+            refused.append(f"boat {fix.boat} is given twice")
+        fixes.setdefault(fix.boat, fix)
+    return Packet(head.sender, head.run, head.seq, tuple(fixes.values()), refused=tuple(refused), stamp=stamp)
+
+
+def game_state(content: Mapping[str, Any]) -> GameState:
+    """The state of a game from plain values, the inverse of `GameState.as_dict`.
+
+    Raises:
+        FeedError: a value is missing or makes no sense.
+    """
+    if missing := [key for key in ("captures", "grabs", "tags", "over") if key not in content]:
+        raise FeedError(f"the game has no {missing[0]}; give it")
+    try:
+        return _GAME.validate_python(dict(content))
+    except ValidationError as error:
+        raise FeedError(f"the game's {_fault(error)}") from None
+
+
+def _fix(entry: Any) -> Fix:
+    if not isinstance(entry, dict):
+        raise FeedError(f"contact {short(entry)} is no object; give one with its boat, place, heading and speed")
+    boat = f"boat {short(entry.get('boat'))}"
+    for key, values in NOT_AVAILABLE.items():
+        if type(entry.get(key)) in (int, float) and entry[key] in values:
+            raise FeedError(
+                f'{boat}: {key} is {entry[key]}, which means "not available"; leave the boat out until it is known'
+            )
+    try:
+        return _FIX.validate_python(entry)
+    except ValidationError as error:
+        raise FeedError(f"{boat}: {_fault(error)}") from None
+
+
+def _fault(error: ValidationError) -> str:
+    """The first thing wrong: where it is, the value found, and what it should be."""
+    fault = error.errors(include_url=False)[0]
+    place = short(".".join(map(str, fault["loc"])) or "content")
+    if fault["type"] in ("missing", "missing_argument"):
+        return f"{place} is missing; give it"
+    return f"{place} is {short(fault['input'])}: {fault['msg'].replace('Input', 'it', 1)}"
+
+
+def short(value: Any) -> str:
+    """A value in a line for a person, 60 characters at most."""
+    text = value if isinstance(value, str) else str(value) if isinstance(value, BaseException) else repr(value)
+    text = "".join(letter if letter.isprintable() else "?" for letter in text)
+    return text if len(text) <= 60 else f"{text[:59]}…"
+
+
+def _refuse_constant(name: str) -> NoReturn:
+    raise ValueError(f"{name} is no number of JSON")
 
 
 class Seal:
@@ -144,65 +303,101 @@ def is_sealed(data: bytes) -> bool:
     return len(data) >= SEAL_BYTES and data[-SEAL_BYTES:-_DIGITS] == _MARK
 
 
-def parse_packet(data: bytes) -> Packet:
-    """The packet in a datagram. A fix that cannot be used is left out and named; anything else wrong refuses it all.
+class FeedSender(Closing):
+    """Sends packets of the feed under one name; never waits. A context manager.
+
+    Args:
+        sender: its name.
+        to: HOST:PORT of each listener; looked up once, since a name server could be waited for.
+        key: the 32-byte signing key, so that packets are sealed; None: they are not.
 
     Raises:
-        FeedError: it is too long, no JSON, of another version or kind, or a value is missing, not finite or absurd.
+        ConfigError: an address is not of that form, or its host unknown, or the key has another length.
     """
-    if len(data) > MAX_BYTES:
-        raise FeedError(f"packet of {len(data)} bytes; {MAX_BYTES} at most")
-    try:
-        content = json.loads(data, parse_constant=_refuse_constant)
-    except (ValueError, RecursionError) as error:
-        raise FeedError(f"packet is not JSON ({short(error)})") from None
-    if not isinstance(content, dict) or content.get("steerclear") != 1 or isinstance(content["steerclear"], bool):
-        raise FeedError('packet is not of this feed; begin it with {"steerclear": 1, ...')
-    sender, run, seq = check_name(content.get("sender"), "sender"), _count(content, "run", 0), _count(content, "seq")
-    stamp = _count(content, "stamp") if "stamp" in content else None
-    if content.get("kind") == "game":
-        game = game_state(content)
-        return Packet(sender, run, seq, game=replace(game, note=game.note[:200]), stamp=stamp)
-    if content.get("kind") != "positions":
-        raise FeedError(f"packet of kind {short(content.get('kind'))}; kinds are positions and game")
-    contacts = content.get("contacts")
-    if not isinstance(contacts, list) or len(contacts) > MOST_BOATS:
-        raise FeedError(f"contacts is {short(contacts)}; give a list, {MOST_BOATS} boats at most")
-    fixes: dict[str, Fix] = {}
-    refused = []
-    for entry in contacts:
+
+    def __init__(self, sender: str, to: Iterable[str], key: bytes | None = None) -> None:
+        self.sender = sender
+        self.run = random.SystemRandom().randrange(1, 2**31)
+        self._seal, self._clock, self._seq = None if key is None else Seal(key), SigningClock(), 0
+        self._to: list[tuple[str, int]] = []
+        for host, port in map(socket_address, to):
+            try:
+                found = socket.getaddrinfo(host, None, family_of(host), socket.SOCK_DGRAM)
+            except OSError as error:
+                raise ConfigError(f"nobody knows the host {host!r} ({error.strerror}); give its address") from None
+            self._to.append((str(found[0][4][0]), port))
+        families = {family_of(host) for host, _ in self._to}
+        self._sockets = {family: socket.socket(family, socket.SOCK_DGRAM) for family in families}
+        for opened in self._sockets.values():
+            opened.setblocking(False)
+
+    def send_positions(self, fixes: Sequence[Fix]) -> None:
+        """Send where boats are, or raise `FeedError`: a value is not finite, or they are too many for one packet."""
+        self._send(fixes=tuple(fixes))
+
+    def send_game(self, game: GameState) -> None:
+        """Send how the game stands, or raise `FeedError`: a value is not finite, or the packet is too long."""
+        self._send(game=game)
+
+    def close(self) -> None:
+        """Give the sockets back; may be called again."""
+        for entry in self._sockets.values():
+            entry.close()
+
+    def _send(self, fixes: tuple[Fix, ...] = (), game: GameState | None = None) -> None:
+        stamp = None if self._seal is None else self._clock.take()
+        data = Packet(self.sender, self.run, self._seq, fixes, game, stamp=stamp).encode()
+        data = data if self._seal is None else self._seal.close(data)
+        self._seq += 1
+        for host, port in self._to:
+            try:
+                self._sockets[family_of(host)].sendto(data, (host, port))
+            except OSError as error:  # nobody listens there now, or the network is away: the next packet tries again
+                LOG.debug("feed to %s:%d: %s", host, port, error)
+
+
+class PositionPublisher:
+    """A sink that tells others (runners, the referee) where our boats are, to within ``error_m``."""
+
+    def __init__(self, sender: FeedSender, frame: FieldFrame, error_m: float) -> None:
+        self._sender, self._frame, self._error_m = sender, frame, error_m
+        self._told = False
+
+    def take(self, tick: Tick) -> None:
+        """Send the fixes of a tick."""
+        fixes = []
+        for reading in tick.readings.values():
+            if math.isfinite(reading.age_s):
+                place = self._frame.to_geodetic_deg(*reading.position_m)
+                heading_deg = math.degrees(self._frame.heading_to_true_rad(reading.heading_rad))
+                fixes.append(Fix(reading.boat, *place, heading_deg, reading.speed_mps, reading.age_s, self._error_m))
+        if not fixes or tick.number % PUBLISH_EVERY:
+            return
         try:
-            fix = _fix(entry)
-        except FeedError as error:
-            refused.append(str(error))
-            continue
-        if fix.boat in fixes:
-            refused.append(f"boat {fix.boat} is given twice")
-        else:
-            fixes[fix.boat] = fix
-    return Packet(sender, run, seq, fixes=tuple(fixes.values()), refused=tuple(refused), stamp=stamp)
+            self._sender.send_positions(fixes)
+        except FeedError as error:  # an impossible reading must not stop the others for good
+            if not self._told:
+                LOG.warning("positions not published: %s", error)
+            self._told = True
+
+    def close(self) -> None:
+        """Give the socket back."""
+        self._sender.close()
 
 
-def _fix(entry: Any) -> Fix:
-    boat = check_name(entry.get("boat") if isinstance(entry, dict) else entry, "boat")
-    if not isinstance(entry, dict):
-        raise FeedError(f"contact {boat} is a text; give an object with its boat, place, heading and speed")
-    for key, values in NOT_AVAILABLE.items():
-        if type(entry.get(key)) in (int, float) and entry[key] in values:
-            text = f'{key} is {entry[key]}, which means "not available"; leave the boat out until it is known'
-            raise FeedError(f"boat {boat}: {text}")
-    try:
-        return _READER.validate_python(entry)
-    except ValidationError as error:
-        raise FeedError(f"boat {boat}: {fault_of(error)}") from None
+def socket_address(text: str) -> tuple[str, int]:
+    """Host and port of HOST:PORT; an IPv6 host may stand in brackets.
+
+    Raises:
+        ConfigError: it is not of that form.
+    """
+    host, colon, port = text.rpartition(":")
+    host = host.removeprefix("[").removesuffix("]")
+    if not colon or not host or not port.isdecimal() or int(port) > 65535:
+        raise ConfigError(f'{text!r} is no address; give "HOST:PORT", such as "127.0.0.1:14700"')
+    return host, int(port)
 
 
-def _count(content: Mapping[str, Any], key: str, otherwise: Any = None) -> int:
-    value = content.get(key, otherwise)
-    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < 2**63:
-        raise FeedError(f"{key} is {short(value)}; give a whole number >= 0")
-    return value
-
-
-def _refuse_constant(name: str) -> NoReturn:
-    raise FeedError(f"{name} is no number of JSON")
+def family_of(host: str) -> socket.AddressFamily:
+    """IPv6 or IPv4; names, such as localhost, count as IPv4."""
+    return socket.AF_INET6 if ":" in host else socket.AF_INET

@@ -6,7 +6,7 @@ import errno
 import json
 import os
 import stat
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -18,12 +18,11 @@ from ..exceptions import FleetFileError
 from ..platforms import Platform
 from ..platforms.files import is_path, load_platform
 from ..surroundings import Surroundings
-from .fleet_checks import check_fleet, contact_kind, platform_of, shield_config
-from .fleet_messages import explain
-from .fleet_settings import BoatSettings, FleetSettings
+from .fleet_checks import check_fleet, platform_of, shield_config
+from .fleet_settings import BoatSettings, FleetSettings, explain
 from .fleet_yaml import MOST_BYTES, read_settings
 from .frame import FieldFrame
-from .obstacles import check_obstacles, corners_m, read_obstacles
+from .static_obstacles import corners_m, read_obstacles
 
 VERSION = 1
 """Of the format."""
@@ -56,8 +55,7 @@ class FleetFile(FleetSettings):
             FleetFileError: a setting is unknown or out of range.
         """
         changed = self.model_copy(update={"shield": {**self.shield, **settings}})
-        vars(changed).pop("shield_config", None)  # the copy comes with what was worked out for this one
-        shield_config(changed)
+        vars(changed)["shield_config"] = shield_config(changed)  # the copy comes with what was worked out for this one
         return changed
 
     @cached_property
@@ -94,9 +92,8 @@ class FleetFile(FleetSettings):
     @cached_property
     def kind_of(self) -> Mapping[str, str | Platform]:
         """Platform of each boat as fleets have it: its name, or the platform itself when the file describes it."""
-        kinds = {boat.name: boat.platform for boat in self.boats}
-        described = {name: kind in self.platforms or is_path(kind) for name, kind in kinds.items()}
-        return {name: self.platform_of[name] if described[name] else kind for name, kind in kinds.items()}
+        described = {b.name: b.platform in self.platforms or is_path(b.platform) for b in self.boats}
+        return {b.name: self.platform_of[b.name] if described[b.name] else b.platform for b in self.boats}
 
     def measured_of(self, name: str) -> Mapping[str, float]:
         """What a fit measured of a boat, from its platform's file; empty: nothing."""
@@ -132,11 +129,7 @@ class FleetFile(FleetSettings):
     @property
     def ours(self) -> tuple[BoatSettings, ...]:
         """Boats of our team with a link, to be commanded by some process of ours."""
-        return tuple(
-            boat
-            for boat in self.boats
-            if boat.link is not None and boat.commanded and self.team_of[boat.name] == self.team_number
-        )
+        return tuple(boat for boat in self.boats if boat.is_steered and self.team_of[boat.name] == self.team_number)
 
     def commanded(self, only: str | None = None) -> tuple[BoatSettings, ...]:
         """Boats a process commands: those of our team with a link, or the one named.
@@ -151,14 +144,17 @@ class FleetFile(FleetSettings):
             return ours
         boat = self.boat(only)
         if boat not in ours:
-            raise FleetFileError(
-                f"boat {only!r} is not ours to command; choose one of {', '.join(b.name for b in ours)}"
-            )
+            names = ", ".join(boat.name for boat in ours)
+            raise FleetFileError(f"boat {only!r} is not ours to command; choose one of {names}")
         return (boat,)
 
     def contact_of(self, boat: BoatSettings) -> str:
         """How a process that does not command this boat knows it: "feed", "telemetry" or "moos"."""
-        return contact_kind(self, boat)
+        if boat.contact is not None:
+            return boat.contact
+        if boat.link is None and any(other.by_moos for other in self.boats):
+            return "moos"
+        return "feed" if self.feed is not None else "telemetry"
 
     def feed_listen(self, boat: str | None = None) -> str | None:
         """HOST:PORT at which a runner hears the feed: the team's, or the one of a boat's own process."""
@@ -176,9 +172,8 @@ class FleetFile(FleetSettings):
     def position_listeners(self) -> tuple[str, ...]:
         """Every HOST:PORT positions go to: the runners' and the referee's."""
         referee = () if self.feed is None or self.feed.referee is None else (self.feed.referee,)
-        others = [boat for boat in self.boats if boat.link is None]
-        by_moos = bool(others) and all(self.contact_of(boat) == "moos" for boat in others)
-        return (*(() if by_moos else self.feed_listeners()), *referee)
+        others = {self.contact_of(boat) for boat in self.boats if boat.link is None}
+        return (*(() if others == {"moos"} else self.feed_listeners()), *referee)
 
 
 def parse_fleet(text: str, where: str = "FLEET.yaml", folder: Path | None = None) -> FleetFile:
@@ -202,17 +197,15 @@ def parse_fleet(text: str, where: str = "FLEET.yaml", folder: Path | None = None
     version = content.get("version")
     if isinstance(version, int) and version > VERSION:
         raise FleetFileError(f"{where}: version {version} is newer than this steerclear reads ({VERSION}); update it")
-    try:
-        fleet = FleetFile.model_validate_json(json.dumps(content))  # by JSON's rules lists are lists, and texts paths
+    try:  # by JSON's rules lists are lists, and texts paths
+        fleet = FleetFile.model_validate_json(json.dumps(content), context=folder)
+        if folder is not None:
+            boats = tuple(boat if boat.platform in fleet.platforms else _rooted(boat, folder) for boat in fleet.boats)
+            fleet = fleet.model_copy(update={"boats": boats, "log_dir": folder / fleet.log_dir})
+        fleet = fleet.model_copy(update={"obstacles": read_obstacles(fleet)})
+        check_fleet(fleet)
     except ValidationError as error:
         raise FleetFileError(f"{where}: {explain(error, FleetFile)}") from None
-    if folder is not None:
-        fleet = _rooted(fleet, folder)
-    try:
-        if fleet.obstacles:
-            fleet = fleet.model_copy(update={"obstacles": read_obstacles(fleet, folder or Path())})
-            check_obstacles(fleet, fleet.frame)
-        check_fleet(fleet)
     except FleetFileError as error:
         raise FleetFileError(f"{where}: {error}") from None
     return fleet
@@ -234,7 +227,11 @@ def load_with_text(path: str | Path) -> tuple[FleetFile, str]:
         FleetFileError: as `load_fleet`.
     """
     try:
-        text = _read(Path(path))
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+        with os.fdopen(descriptor, "rb") as file:
+            if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+                raise OSError(errno.EINVAL, "it is no plain file")
+            text = file.read(MOST_BYTES + 1).decode("utf-8")  # no more of it than a fleet file may hold
         folder = Path(path).resolve().parent
     except (OSError, ValueError) as error:  # a path may hold what no path can
         why = getattr(error, "strerror", None) or error
@@ -242,33 +239,6 @@ def load_with_text(path: str | Path) -> tuple[FleetFile, str]:
     return parse_fleet(text, str(path), folder), text
 
 
-def _read(path: Path) -> str:
-    """The text of a file that is one, no more of it than a fleet file may hold.
-
-    Raises:
-        OSError: it cannot be read, or is no plain file.
-        ValueError: it holds no text.
-    """
-    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
-    with os.fdopen(descriptor, "rb") as file:
-        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-            raise OSError(errno.EINVAL, "it is no plain file")
-        return file.read(MOST_BYTES + 1).decode("utf-8")
-
-
-def _rooted(fleet: FleetFile, folder: Path) -> FleetFile:
-    update: dict[str, Any] = {"log_dir": folder / fleet.log_dir}
-    if fleet.signing is not None:
-        update["signing"] = fleet.signing.model_copy(update={"key_file": folder / fleet.signing.key_file})
-    boats = tuple(_with_root(boat, folder, fleet.platforms) for boat in fleet.boats)
-    return fleet.model_copy(update={**update, "boats": boats})
-
-
-def _with_root(boat: BoatSettings, folder: Path, described: Collection[str]) -> BoatSettings:
-    """The boat with the paths of its platform's file and of its mission rooted."""
-    by_file = is_path(boat.platform) and boat.platform not in described
-    update: dict[str, Any] = {"platform": str(folder / boat.platform)} if by_file else {}
-    mission = getattr(boat.link, "mission", None)
-    if boat.link is not None and mission is not None:
-        update["link"] = boat.link.model_copy(update={"mission": folder / mission})
-    return boat.model_copy(update=update) if update else boat
+def _rooted(boat: BoatSettings, folder: Path) -> BoatSettings:
+    """The boat, with the path of its platform's file from that folder."""
+    return boat.model_copy(update={"platform": str(folder / boat.platform)}) if is_path(boat.platform) else boat

@@ -1,18 +1,20 @@
-"""The sections of a FLEET.yaml: their keys, units and bounds."""
+"""The sections of a FLEET.yaml: their keys, units and bounds, and what is said where a file breaks them."""
 
 from __future__ import annotations
 
 import json
+import math
+import re
+from difflib import get_close_matches
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
+from pydantic.fields import FieldInfo
 
-from .fleet_messages import explain
+from .fleet_yaml import short
 
 Response = Literal["hold_course", "slow", "hold_station", "stop"]
-FenceResponse = Literal["return", "hold_course", "slow", "hold_station", "stop"]
-LogResponse = Literal["go_on", "hold_course", "slow", "hold_station", "stop"]
 
 Name = Annotated[
     str,
@@ -24,6 +26,14 @@ Degrees = Annotated[float, Field(ge=-180.0, le=180.0, description="give degrees"
 Length = Annotated[float, Field(gt=0.0, le=1e5, description="give metres > 0")]
 
 
+def _rooted(path: Path, info: ValidationInfo) -> Path:
+    return path if info.context is None else info.context / path
+
+
+Place = Annotated[Path, AfterValidator(_rooted)]
+"""A path that starts from the file's folder, which is the validation's context; None leaves it."""
+
+
 class Section(BaseModel):
     """Part of the file: unknown keys are errors, nothing is taken for something else, values never change."""
 
@@ -33,17 +43,15 @@ class Section(BaseModel):
 class Origin(Section):
     """Where the field's corner (0, 0) is."""
 
-    latitude_deg: Annotated[float, Field(ge=-89.0, le=89.0, description="give the corner's latitude, deg")]
-    longitude_deg: Annotated[float, Field(ge=-180.0, le=180.0, description="give the corner's longitude, deg")]
+    latitude_deg: float = Field(ge=-89.0, le=89.0, description="give the corner's latitude, deg")
+    longitude_deg: float = Field(ge=-180.0, le=180.0, description="give the corner's longitude, deg")
 
 
 class FieldSettings(Section):
     """The field of play; y axis along ``y_axis_deg``, deg clockwise from true north; size along x and y, m."""
 
     origin: Origin = Field(description="give latitude_deg and longitude_deg of the field's corner")
-    y_axis_deg: Annotated[
-        float, Field(ge=-360.0, le=360.0, description="give the true course of the field's y axis, deg")
-    ] = 0.0
+    y_axis_deg: float = Field(0.0, ge=-360.0, le=360.0, description="give the true course of the field's y axis, deg")
     size_m: tuple[Length, Length] = Field(description="give [length along x, length along y] in m")
 
 
@@ -59,9 +67,7 @@ class Geofence(Section):
     ymin_m: Metres
     xmax_m: Metres
     ymax_m: Metres
-    beyond_m: Annotated[float, Field(ge=0.0, le=1000.0, description="give metres outside the geofence, 0 to 1000")] = (
-        10.0
-    )
+    beyond_m: float = Field(10.0, ge=0.0, le=1000.0, description="give metres outside the geofence, 0 to 1000")
     then: Literal["stop", "flee"] = Field("stop", description="stop or flee: what a boat beyond the hard line does")
 
     @property
@@ -69,9 +75,14 @@ class Geofence(Section):
         """(xmin, ymin, xmax, ymax), m."""
         return self.xmin_m, self.ymin_m, self.xmax_m, self.ymax_m
 
+    def outside_m(self, x_m: float, y_m: float) -> float:
+        """How far outside a point is, m; negative: how far inside; NaN stays NaN."""
+        dx, dy = max(self.xmin_m - x_m, x_m - self.xmax_m), max(self.ymin_m - y_m, y_m - self.ymax_m)
+        return math.hypot(dx, dy) if min(dx, dy) > 0.0 else max(dx, dy)
+
     def holds(self, x_m: float, y_m: float) -> bool:
         """Whether a point is inside; NaN is not."""
-        return self.xmin_m <= x_m <= self.xmax_m and self.ymin_m <= y_m <= self.ymax_m
+        return self.outside_m(x_m, y_m) <= 0.0
 
 
 class Obstacle(Section):
@@ -89,7 +100,7 @@ class Obstacle(Section):
         None, min_length=3, description="give corners [latitude, longitude] in deg, at least three"
     )
     circle_m: tuple[Metres, Metres, Length] | None = Field(None, description="give [x, y, radius] in m")
-    geojson: Path | None = Field(None, description="give the path of a GeoJSON file")
+    geojson: Place | None = Field(None, description="give the path of a GeoJSON file")
 
 
 class LinkSettings(Section):
@@ -100,10 +111,10 @@ class LinkSettings(Section):
     """
 
     kind: Literal["mavlink", "moos"] = Field(description="the kind of link: mavlink or moos")
-    address: Annotated[str, Field(min_length=4, max_length=200, description='give e.g. "udpin:127.0.0.1:14550"')]
-    system_id: Annotated[int, Field(ge=1, le=255, description="give the autopilot's MAVLink system id, 1 to 255")]
-    rate_hz: Annotated[float, Field(gt=0.0, le=40.0, description="give the telemetry rate, Hz, at most 40")] = 20.0
-    route: Annotated[str, Field(min_length=1, description='give "auto" or the name of a route')] = "auto"
+    address: str = Field(min_length=4, max_length=200, description='give e.g. "udpin:127.0.0.1:14550"')
+    system_id: int = Field(ge=1, le=255, description="give the autopilot's MAVLink system id, 1 to 255")
+    rate_hz: float = Field(20.0, gt=0.0, le=40.0, description="give the telemetry rate, Hz, at most 40")
+    route: str = Field("auto", min_length=1, description='give "auto" or the name of a route')
 
 
 class MoosLinkSettings(LinkSettings):
@@ -117,16 +128,14 @@ class MoosLinkSettings(LinkSettings):
     """
 
     kind: Literal["moos"] = Field(description="the kind of link: moos")
-    address: Annotated[str, Field(pattern=r"^moos://", max_length=200, description='give "moos://HOST:PORT"')]
-    system_id: Annotated[int, Field(ge=1, le=1, description="leave system_id out: MOOS has none")] = 1
+    address: str = Field(pattern=r"^moos://", max_length=200, description='give "moos://HOST:PORT"')
+    system_id: int = Field(1, ge=1, le=1, description="leave system_id out: MOOS has none")
     gate: Literal["helm", "pid"] = Field("helm", description="give helm or pid")
-    prefix: Annotated[str, Field(pattern=r"^[A-Z0-9_]{1,16}$", description="give the helm_prefix, such as RAW_")] = (
-        "RAW_"
-    )
+    prefix: str = Field("RAW_", pattern=r"^[A-Z0-9_]{1,16}$", description="give the helm_prefix, such as RAW_")
     corner_m: tuple[Metres, Metres] = Field((0.0, 0.0), description="give [x, y] of the field's corner in m")
-    mission: Path | None = Field(None, description="give the path of the boat's .moos file")
-    thrust_timeout_s: Annotated[float, Field(gt=0.0, le=10.0, description="give seconds, at most 10")] | None = None
-    nothing_stops_it: Annotated[bool, Field(description="give true, or leave it out")] = False
+    mission: Place | None = Field(None, description="give the path of the boat's .moos file")
+    thrust_timeout_s: float | None = Field(None, gt=0.0, le=10.0, description="give seconds, at most 10")
+    nothing_stops_it: bool = Field(False, description="give true, or leave it out")
 
 
 class BoatSettings(Section):
@@ -141,9 +150,9 @@ class BoatSettings(Section):
     """
 
     name: Name
-    agent: Annotated[str, Field(pattern=r"^agent_[0-9]{1,4}$", description="give agent_0, agent_1, ...")] | None = None
+    agent: str | None = Field(None, pattern=r"^agent_[0-9]{1,4}$", description="give agent_0, agent_1, ...")
     team: Literal["blue", "red"] | None = Field(None, description="give blue or red")
-    platform: Annotated[str, Field(min_length=1, description="give a platform's name, such as heron, or its file")]
+    platform: str = Field(min_length=1, description="give a platform's name, such as heron, or its file")
     link: LinkSettings | None = None
     contact: Literal["feed", "telemetry", "moos"] | None = Field(None, description="give feed, telemetry or moos")
     commanded: bool = True
@@ -151,23 +160,33 @@ class BoatSettings(Section):
 
     @field_validator("link", mode="before")
     @classmethod
-    def _moos_link(cls, value: Any) -> Any:
+    def _moos_link(cls, value: Any, info: ValidationInfo) -> Any:
         """A link to a MOOSDB, which may be its address alone."""
         if isinstance(value, str) and value.startswith("moos:"):
             value = {"kind": "moos", "address": value}
         if isinstance(value, dict) and value.get("kind") == "moos":
             try:
-                return MoosLinkSettings.model_validate_json(json.dumps(value))
+                return MoosLinkSettings.model_validate_json(json.dumps(value), context=info.context)
             except ValidationError as error:  # its own keys and remedies, not those of the other kind
                 raise ValueError(explain(error, MoosLinkSettings)) from None
         return value
+
+    @property
+    def is_steered(self) -> bool:
+        """Whether some process of this file commands it."""
+        return self.link is not None and self.commanded
+
+    @property
+    def by_moos(self) -> bool:
+        """Whether it has a link to a MOOSDB."""
+        return self.link is not None and self.link.kind == "moos"
 
 
 class Signing(Section):
     """MAVLink 2 signing: 32-byte secret key in a file only its owner can read."""
 
-    key_file: Path = Field(description="give the path of the key file")
-    link_id: Annotated[int, Field(ge=0, le=255, description="give this link's number, 0 to 255")] = 1
+    key_file: Place = Field(description="give the path of the key file")
+    link_id: int = Field(1, ge=0, le=255, description="give this link's number, 0 to 255")
 
 
 class Feed(Section):
@@ -223,13 +242,13 @@ class AgeLimit(Section):
 class FenceLimit(Section):
     """A boat outside the geofence; "return" steers it back in at half speed."""
 
-    then: FenceResponse = "return"
+    then: Literal["return", "hold_course", "slow", "hold_station", "stop"] = "return"
 
 
 class LogLimit(Section):
     """The black box cannot be written any more (disk full)."""
 
-    then: LogResponse = "hold_station"
+    then: Literal["go_on", "hold_course", "slow", "hold_station", "stop"] = "hold_station"
 
 
 class ModelLimit(Section):
@@ -239,7 +258,7 @@ class ModelLimit(Section):
     foreseen 2 s ago, for ``after_s``: the response; for ``give_up_after_s``: handed over, by another.
     """
 
-    widest_m: Annotated[float, Field(ge=0.0, le=10.0, description="give metres, 0 to 10")] = 1.0
+    widest_m: float = Field(1.0, ge=0.0, le=10.0, description="give metres, 0 to 10")
     outside_m: Length = 1.5
     after_s: Seconds = 3.0
     then: Response = "slow"
@@ -262,7 +281,7 @@ class Limits(Section):
     geofence: FenceLimit = FenceLimit()
     log: LogLimit = LogLimit()
     model: ModelLimit = ModelLimit()
-    after_failsafe: Annotated[Literal["wait", "retake"], Field(description="give wait or retake")] = "wait"
+    after_failsafe: Literal["wait", "retake"] = Field("wait", description="give wait or retake")
 
 
 class End(Section):
@@ -279,8 +298,8 @@ class End(Section):
 class FleetSettings(Section):
     """The whole file, section by section; `fleet_file.FleetFile` adds what follows from it."""
 
-    version: Annotated[int, Field(ge=1, le=1, description="give the version of the format: 1")]
-    rate_hz: Annotated[float, Field(ge=1.0, le=50.0, description="give the loop's rate, Hz, 1 to 50")] = 10.0
+    version: int = Field(ge=1, le=1, description="give the version of the format: 1")
+    rate_hz: float = Field(10.0, ge=1.0, le=50.0, description="give the loop's rate, Hz, 1 to 50")
     field: FieldSettings = Field(description="give origin and size_m of the field")
     geofence: Geofence = Field(description="give xmin_m, ymin_m, xmax_m, ymax_m: the operating area")
     obstacles: tuple[Obstacle, ...] = Field((), max_length=64, description="give a list of shores and keep-out areas")
@@ -288,7 +307,7 @@ class FleetSettings(Section):
     coordination: Literal["team", "per_boat"] = Field(
         "team", description="team (one process for all boats) or per_boat (a process per boat)"
     )
-    preset: Annotated[str, Field(min_length=1, description="give the name of the game's rules")] = "aamas2024"
+    preset: str = Field("aamas2024", min_length=1, description="give the name of the game's rules")
     rules: dict[str, Any] = Field({}, description="give settings of the game that differ from the preset's")
     shield: dict[str, Any] = Field({}, description="give settings of the shield, by name")
     platforms: dict[Name, dict[str, Any]] = Field({}, description="give platforms of your own, by name")
@@ -298,3 +317,47 @@ class FleetSettings(Section):
     limits: Limits = Limits()
     end: End = End()
     log_dir: Path = Field(Path("logs"), description="give the folder of the logs")
+
+
+def explain(error: ValidationError, root: type[BaseModel]) -> str:
+    """The first fault with where it is and the remedy, and how many more there are, in one line."""
+    faults = error.errors(include_url=False)
+    faults.sort(key=lambda fault: fault["type"] != "extra_forbidden")  # a misspelt key explains the missing one
+    fault, place = faults[0], tuple(faults[0]["loc"])
+    owner, entry = _find(root, place)
+    name = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in place).removeprefix(".")
+    name, remedy = short(name, 120), None if entry is None else entry.description
+    if fault["type"] == "extra_forbidden":
+        known = list(owner.model_fields)
+        near = get_close_matches(str(place[-1]), known, 1, 0.5)
+        hint = f"did you mean {near[0]!r}?" if near else f"known keys: {', '.join(known)}"
+        text = f"unknown key {name!r}; {hint}"
+    elif fault["type"] == "missing":
+        text = f"{name} is missing; {remedy or 'give it'}"
+    else:
+        said = "" if remedy and fault["type"] == "string_pattern_mismatch" else f": {_said(fault['msg'])}"
+        text = f"{name} is {short(repr(fault['input']))}{said}; {remedy or 'correct it'}"
+    return text if len(faults) == 1 else f"{text} (and {len(faults) - 1} more)"
+
+
+def _said(message: str) -> str:
+    return re.sub("^(Input|String|List|Tuple|Dictionary|Value)(?= should)", "it", message)
+
+
+def _find(root: type[BaseModel], place: tuple[int | str, ...]) -> tuple[type[BaseModel], FieldInfo | None]:
+    """The model that owns a place, and the field there as far as it is known."""
+    owner, entry = root, None
+    for part in place:
+        if isinstance(part, str):
+            if part not in owner.model_fields:
+                break
+            entry = owner.model_fields[part]
+            owner = _model_in(entry.annotation) or owner
+    return owner, entry
+
+
+def _model_in(annotation: Any) -> type[BaseModel] | None:
+    """The model inside ``X``, ``X | None``, ``tuple[X, ...]``."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return next((found for part in get_args(annotation) if (found := _model_in(part)) is not None), None)

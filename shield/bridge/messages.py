@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Any, Protocol, runtime_checkable
@@ -37,50 +37,29 @@ PILOT, FAILSAFE = "pilot", "failsafe"
 
 @dataclass(frozen=True)
 class BoatReading:
-    """What one boat's own telemetry says, taken at one moment; each field with its own age. NaN: never received.
-
-    Attributes:
-        boat: its name.
-        read_s: time of this reading, s.
-        position_m: x, y.
-        position_age_s: since the position was true as far as the link can tell, s.
-        heading_rad: in [0, 2 pi).
-        heading_age_s: s.
-        speed_mps: along the heading, over ground; negative astern, m/s.
-        course_rad: of the velocity over ground; NaN below 0.1 m/s.
-        velocity_age_s: s.
-        turn_rate_rads: clockwise, rad/s.
-        turn_rate_age_s: s.
-        mode: name of the autopilot's mode.
-        ready: whether commands of heading and speed would be obeyed now (armed, in the right mode).
-        why_not: why not, in words; empty when ready.
-        released: whether somebody took the boat and nobody of ours took it back yet; in whatever mode it is now.
-        released_by: who took it: `PILOT`, `FAILSAFE` (the autopilot said so itself), or empty.
-        failsafe_over: whether the autopilot said that what made it fail safe is over.
-        heartbeat_age_s: s.
-        texts: what the autopilot said since the last reading.
-        faults: what the link refused since the last reading (bad signature, bad checksum, impossible value), by kind.
-    """
+    """What one boat's own telemetry says, taken at one moment; each field with its own age. NaN: never received."""
 
     boat: str
-    read_s: float
-    position_m: tuple[float, float] = (math.nan, math.nan)
-    position_age_s: float = NEVER_S
-    heading_rad: float = math.nan
+    read_s: float  # time of this reading, s
+    position_m: tuple[float, float] = (math.nan, math.nan)  # x, y
+    position_age_s: float = NEVER_S  # since the position was true as far as the link can tell, s
+    heading_rad: float = math.nan  # in [0, 2 pi)
     heading_age_s: float = NEVER_S
-    speed_mps: float = math.nan
-    course_rad: float = math.nan
+    speed_mps: float = math.nan  # along the heading, over ground; negative astern, m/s
+    course_rad: float = math.nan  # of the velocity over ground; NaN below 0.1 m/s
     velocity_age_s: float = NEVER_S
-    turn_rate_rads: float = math.nan
+    turn_rate_rads: float = math.nan  # clockwise, rad/s
     turn_rate_age_s: float = NEVER_S
-    mode: str = ""
-    ready: bool = False
-    why_not: str = "nothing heard yet"
+    mode: str = ""  # name of the autopilot's mode
+    ready: bool = False  # whether commands of heading and speed would be obeyed now (armed, in the right mode)
+    why_not: str = "nothing heard yet"  # why not, in words; empty when ready
+    # whether somebody took the boat and nobody of ours took it back yet; in whatever mode it is now
     released: bool = False
-    released_by: str = ""
-    failsafe_over: bool = False
+    released_by: str = ""  # who took it: `PILOT`, `FAILSAFE` (the autopilot said so itself), or empty
+    failsafe_over: bool = False  # whether the autopilot said that what made it fail safe is over
     heartbeat_age_s: float = NEVER_S
-    texts: tuple[str, ...] = ()
+    texts: tuple[str, ...] = ()  # what the autopilot said since the last reading
+    # what the link refused since the last reading (bad signature, bad checksum, impossible value), by kind
     faults: dict[str, int] = field(default_factory=dict)
 
     @property
@@ -97,25 +76,31 @@ class BoatReading:
 
 @dataclass(frozen=True)
 class Sent:
-    """What left for the boat.
-
-    Attributes:
-        boat: its name.
-        sent_s: time, s.
-        heading_rad: as encoded.
-        speed_mps: as encoded and limited by the autopilot's own limit, m/s.
-        route: name of the message used, or why nothing was sent.
-        delivered: whether bytes left this machine.
-        limit_mps: speeds beyond it, either way, are cut by the link to what the autopilot would do; inf: none are.
-    """
+    """What left for the boat."""
 
     boat: str
-    sent_s: float
-    heading_rad: float
-    speed_mps: float
-    route: str
-    delivered: bool
+    sent_s: float  # time, s
+    heading_rad: float  # as encoded
+    speed_mps: float  # as encoded and limited by the autopilot's own limit, m/s
+    route: str  # name of the message used, or why nothing was sent
+    delivered: bool  # whether bytes left this machine
+    # speeds beyond it, either way, are cut by the link to what the autopilot would do; inf: none are
     limit_mps: float = math.inf
+
+
+class Closing:
+    """What is closed by leaving it as a context."""
+
+    def close(self) -> None:
+        """Give back what it holds; may be called again."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
 
 
 def never() -> bool:
@@ -124,34 +109,21 @@ def never() -> bool:
 
 
 class Link(Protocol):
-    """One boat, whatever its link speaks. A context manager: leaving it leaves the boat stopped or holding, verified.
+    """One boat, whatever its link speaks. A context manager: leaving it leaves the boat stopped or held, verified."""
 
-    Attributes:
-        boat: its name.
-    """
-
-    boat: str
+    boat: str  # its name
 
     def connect(self, timeout_s: float) -> None:
-        """Open, hear the boat, get the streams needed.
-
-        Raises:
-            LinkError: no boat answers in time, or the address cannot be used.
-        """
+        """Open, hear the boat, get the streams needed; `LinkError` where none answers in time."""
 
     def learn(self, timeout_s: float) -> None:
         """Ask for what checks look at and is not known yet; mostly nothing."""
-        return
 
     def prepare(self, timeout_s: float, is_off: Callable[[], bool] = never) -> None:
         """Bring the boat to where it obeys: mode and arming, each step checked.
 
         Also one that somebody took from us, which is left alone until then, whatever mode it comes back to. When that
-        fails it is left alone as before.
-
-        Args:
-            timeout_s: how long to try, s.
-            is_off: true once it is not to be done any more; it then ends at once.
+        fails it is left alone as before. Once ``is_off`` says so it ends at once.
 
         Raises:
             LinkRefused: the autopilot says no; its own words are in the text.
@@ -162,21 +134,13 @@ class Link(Protocol):
         """The latest of everything; never waits."""
 
     def send(self, heading_rad: float, speed_mps: float) -> Sent:
-        """Send a command as it is; never waits, raises only on values that are not finite.
-
-        Raises:
-            LinkError: heading or speed is not finite; nothing is sent.
-        """
+        """Send a command as it is; never waits. `LinkError`, and nothing is sent, where a value is not finite."""
 
     def stop(self) -> Sent:
         """Tell the boat to stop, by the surest way the link has; never waits, never raises."""
 
     def close(self) -> str:
-        """Stop or hold the boat, verify by its telemetry, give the link back; may be called again.
-
-        Returns:
-            What the boat was left doing, in words.
-        """
+        """Stop or hold the boat, verify by its telemetry, give the link back; what it was left doing, in words."""
 
     def health(self) -> Any:
         """What the link knows of itself, of a form of its own."""
@@ -200,16 +164,10 @@ class LinkMaker(Protocol):
         """Make a boat's link; nothing is opened yet."""
 
     def open(self) -> None:
-        """Open all that is shared.
-
-        Raises:
-            LinkError: a wire cannot be opened.
-        """
-        return
+        """Open all that is shared, or raise `LinkError`."""
 
     def close(self) -> None:
         """Give it back; may be called again."""
-        return
 
     def sources(self) -> Sequence[ContactSource]:
         """Who tells of other boats by the same way."""
@@ -217,11 +175,7 @@ class LinkMaker(Protocol):
 
 
 def check_finite(boat: str, heading_rad: float, speed_mps: float) -> None:
-    """Check that a command is made of numbers.
-
-    Raises:
-        LinkError: it is not.
-    """
+    """Check that a command is made of numbers, or raise `LinkError`."""
     if not (math.isfinite(heading_rad) and math.isfinite(speed_mps)):
         raise LinkError(
             f"boat {boat} was to be sent heading {heading_rad} rad and speed {speed_mps} m/s; give finite numbers"
@@ -230,25 +184,15 @@ def check_finite(boat: str, heading_rad: float, speed_mps: float) -> None:
 
 @dataclass(frozen=True)
 class Contact:
-    """The latest fix of one boat seen from outside: an opponent, or a teammate without a link of ours.
-
-    Attributes:
-        boat: its name.
-        position_m: x, y.
-        heading_rad: rad.
-        speed_mps: along the heading, m/s.
-        fixed_s: time the fix was true on the receiver's clock, s: receipt less the age the sender declared.
-        error_m: bound of the position's error, m.
-        source: who said so.
-    """
+    """The latest fix of one boat seen from outside: an opponent, or a teammate without a link of ours."""
 
     boat: str
-    position_m: tuple[float, float]
+    position_m: tuple[float, float]  # x, y
     heading_rad: float
-    speed_mps: float
-    fixed_s: float
-    error_m: float
-    source: str
+    speed_mps: float  # along the heading, m/s
+    fixed_s: float  # time the fix was true on the receiver's clock, s: receipt less the age the sender declared
+    error_m: float  # bound of the position's error, m
+    source: str  # who said so
 
 
 class ContactSource(Protocol):
@@ -263,17 +207,11 @@ class ContactSource(Protocol):
 
 @dataclass(frozen=True)
 class Alarm:
-    """Something wrong with those who tell where boats are.
+    """Something wrong with those who tell where boats are."""
 
-    Attributes:
-        text: one line a person understands.
-        boat: whose place is in doubt; empty: it is about a source as a whole.
-        lost: whether nobody can know that place, so that it cannot be kept clear of.
-    """
-
-    text: str
-    boat: str = ""
-    lost: bool = False
+    text: str  # one line a person understands
+    boat: str = ""  # whose place is in doubt; empty: it is about a source as a whole
+    lost: bool = False  # whether nobody can know that place, so that it cannot be kept clear of
 
 
 @runtime_checkable
@@ -295,39 +233,35 @@ def contact_of(reading: BoatReading, error_m: float) -> Contact | None:
     )
 
 
+def contacts_heard(sources: Iterable[ContactSource], ears: Mapping[str, Link], error_m: float) -> tuple[Contact, ...]:
+    """What sources tell, and links that are only listened to, whose positions are off by at most ``error_m``."""
+    told = [contact_of(link.read(), error_m) for link in ears.values()]
+    heard = [contact for source in sources for contact in source.read()]
+    return (*heard, *(contact for contact in told if contact is not None))
+
+
 @dataclass(frozen=True)
 class Snapshot:
-    """The game as the loop sees it at one tick: what a policy is shown.
+    """The game as the loop sees it at one tick: what a policy is shown."""
 
-    Attributes:
-        number: of the tick.
-        taken_s: time of the tick, s.
-        seen: (n, 4) of all boats of the file in its order: x m, y m, heading deg clockwise from the y axis, speed m/s,
-            run on to ``taken_s``; NaN: never seen.
-        game: state of the game as the referee last sent it; empty: none yet.
-        game_age_s: its age, s; inf: none yet.
-    """
-
-    number: int
-    taken_s: float
+    number: int  # of the tick
+    taken_s: float  # time of the tick, s
+    # (n, 4) of all boats of the file in its order: x m, y m, heading deg clockwise from the y axis, speed m/s, run on
+    # to ``taken_s``; NaN: never seen
     seen: Array
+    # state of the game as the referee last sent it; empty: none yet
     game: Mapping[str, Any] = field(default_factory=dict)
-    game_age_s: float = NEVER_S
+    game_age_s: float = NEVER_S  # its age, s; inf: none yet
 
 
 @dataclass(frozen=True)
 class Answer:
-    """The latest answer of a policy.
+    """The latest answer of a policy."""
 
-    Attributes:
-        commands: absolute commands of all boats of the file in its order, NaN where it has none; None: none yet.
-        age_s: time since the tick whose snapshot it answers, s; inf: none yet.
-        fault: what is wrong with the policy now, for a person; empty: nothing.
-    """
-
+    # absolute commands of all boats of the file in its order, NaN where it has none; None: none yet
     commands: Commands | None = None
-    age_s: float = NEVER_S
-    fault: str = ""
+    age_s: float = NEVER_S  # time since the tick whose snapshot it answers, s; inf: none yet
+    fault: str = ""  # what is wrong with the policy now, for a person; empty: nothing
 
 
 class WantedSource(Protocol):
@@ -335,68 +269,44 @@ class WantedSource(Protocol):
 
     def offer(self, snapshot: Snapshot) -> None:
         """Show it the latest snapshot; older ones it has not looked at are dropped."""
-        return
 
     def latest(self) -> Answer:
         """Its latest answer."""
 
     def close(self) -> None:
         """End it."""
-        return
 
 
 @dataclass(frozen=True)
 class Action:
-    """Something declared that took effect, for one boat or contact.
+    """Something declared that took effect, for one boat or contact."""
 
-    Attributes:
-        subject: name of the boat, contact, policy or link it is about.
-        condition: what happened, such as "telemetry", "contact", "policy", "link", "override", "stop_all".
-        response: what is done, such as "hold_course", "slow", "hold_station", "stop"; "none": it is only said.
-        text: one line a person understands.
-    """
-
-    subject: str
-    condition: str
-    response: str
-    text: str
+    subject: str  # name of the boat, contact, policy or link it is about
+    condition: str  # what happened, such as "telemetry", "contact", "policy", "link", "override", "stop_all"
+    response: str  # what is done, such as "hold_course", "slow", "hold_station", "stop"; "none": it is only said
+    text: str  # one line a person understands
 
 
 @dataclass(frozen=True)
 class Tick:
-    """One turn of the loop: everything it took in, decided and sent; what the black box and the dashboard get.
+    """One turn of the loop: everything it took in, decided and sent; what the black box and the dashboard get."""
 
-    Attributes:
-        number: 0, 1, ... since the start.
-        due_s, began_s, sent_s: when the turn was due, began and had sent its last command, s.
-        readings: of own boats, by name.
-        contacts: of others, as received.
-        fleet: what the shield was given; None when no fleet could be built (then all boats are told to stop).
-        wanted: what the shield was given; rows in the fleet's order.
-        surroundings: what the shield was given.
-        decisions: the shield's answer, or None.
-        shield_reset: whether `Shield.reset` was called before this decision.
-        sent: what left, by boat.
-        policy_age_s: age of the policy's answer, s; inf: none yet.
-        actions: what was declared and took effect.
-        game: state of the game as received, for the record.
-    """
-
-    number: int
-    due_s: float
+    number: int  # 0, 1, ... since the start
+    due_s: float  # when the turn was due, began and had sent its last command, s
     began_s: float
     sent_s: float
-    readings: Mapping[str, BoatReading]
-    contacts: tuple[Contact, ...]
+    readings: Mapping[str, BoatReading]  # of own boats, by name
+    contacts: tuple[Contact, ...]  # of others, as received
+    # what the shield was given; None when no fleet could be built (then all boats are told to stop)
     fleet: Fleet | None
-    wanted: Commands | None
-    surroundings: Surroundings | None
-    decisions: Decisions | None
-    shield_reset: bool
-    sent: Mapping[str, Sent]
-    policy_age_s: float
-    actions: tuple[Action, ...] = ()
-    game: Mapping[str, Any] = field(default_factory=dict)
+    wanted: Commands | None  # what the shield was given; rows in the fleet's order
+    surroundings: Surroundings | None  # what the shield was given
+    decisions: Decisions | None  # the shield's answer, or None
+    shield_reset: bool  # whether `Shield.reset` was called before this decision
+    sent: Mapping[str, Sent]  # what left, by boat
+    policy_age_s: float  # age of the policy's answer, s; inf: none yet
+    actions: tuple[Action, ...] = ()  # what was declared and took effect
+    game: Mapping[str, Any] = field(default_factory=dict)  # state of the game as received, for the record
 
 
 class TickSink(Protocol):
@@ -405,9 +315,7 @@ class TickSink(Protocol):
     def take(self, tick: Tick) -> None:
         """Take one tick; never waits.
 
-        Raises:
-            BridgeError: ticks can no longer be kept (the disk is full, the writer died): the loop falls back as
-                declared.
+        `BridgeError`: ticks can no longer be kept (the disk is full, the writer died): the loop falls back as declared.
         """
 
     def close(self) -> None:

@@ -44,10 +44,6 @@ LATE = 0.6
 class ModelErrorMonitor:
     """Follows the boats of a process.
 
-    Args:
-        fleet: the file: platforms, what was measured of them, and the bounds ``limits.model``.
-        boats: names of those commanded.
-
     Attributes:
         margin_m: bound on the error of each boat's place that the shield is to count on, m.
     """
@@ -70,14 +66,10 @@ class ModelErrorMonitor:
         self.margin_m = {name: float(margin) for name, margin in zip(boats, self._declared_m, strict=True)}
 
     def update(self, rows: Mapping[str, Array | None], readings: Mapping[str, BoatReading]) -> None:
-        """Take the boats as they are believed to be now, before this turn's decision.
+        """Take the boats as they are believed to be now (None: not known), before this turn's decision.
 
         Turns that were left out count, too: nothing was seen in them, and the command before them stayed in force. So a
         loop that often falls behind still finds out a model that is wrong.
-
-        Args:
-            rows: state of each boat as estimated; None: not known.
-            readings: their telemetry.
         """
         read_s = max((reading.read_s for reading in readings.values()), default=self._read_s)
         gap_s, self._read_s = read_s - self._read_s, read_s
@@ -159,8 +151,7 @@ class ModelErrorMonitor:
             growing = f", growing to {goal:.2f} m" if goal > margin + 0.005 else ""
             is_bounded = self.quantile_m(name) > self._limit.widest_m >= goal
             bound = ", the most that limits.model.widest_m allows" if is_bounded else ""
-            text = (
-                f"{name}: its model misses {missed} m 1/2/3 s ahead (95 of 100); margin {margin:.2f} m{growing}{bound}"
-            )
-            found.append(Action(name, "tracking", "none", f"{text}; if it stays so, steerclear fit this run's log"))
+            text = f"{name}: its model misses {missed} m 1/2/3 s ahead (95 of 100); margin {margin:.2f} m{growing}"
+            text += f"{bound}; if it stays so, steerclear fit this run's log"
+            found.append(Action(name, "tracking", "none", text))
         return found

@@ -18,19 +18,22 @@ LONGEST_OVERRIDE_S = 600.0
 
 @dataclass(frozen=True)
 class Override:
-    """A declared response switched off for a while.
+    """A declared response switched off for a while."""
 
-    Attributes:
-        condition: one of `DISABLES`.
-        subject: boat or contact it is about; empty: all.
-        until_s: time it ends, s on the loop's clock.
-        by: who asked for it.
-    """
+    condition: str  # one of `DISABLES`
+    subject: str  # boat or contact it is about; empty: all
+    until_s: float  # time it ends, s on the loop's clock
+    by: str  # who asked for it
 
-    condition: str
-    subject: str
-    until_s: float
-    by: str
+    @property
+    def name(self) -> str:
+        """What it is of."""
+        return f"{self.condition} {self.subject}".strip()
+
+    @property
+    def disables(self) -> str:
+        """What it switches off, in words."""
+        return DISABLES[self.condition]
 
     def covers(self, condition: str, subject: str) -> bool:
         """Whether it switches this response off."""
@@ -38,30 +41,19 @@ class Override:
 
 
 class Operator:
-    """What the operator asked for; safe to call from any thread."""
+    """What the operator asked for; safe to call from any thread.
+
+    Attributes:
+        stopped: why all boats are told to stop; empty: they are not.
+        hard: whether they are stopped by their links, past the shield: STOP ALL was asked for twice.
+        ended: why the run is to end; empty: it goes on.
+    """
 
     def __init__(self) -> None:
+        self.stopped, self.hard, self.ended = "", False, ""
         self._lock = threading.Lock()
         self._overrides: tuple[Override, ...] = ()
-        self._stopped = ""
-        self._hard = False
-        self._ended = ""
         self._taken: tuple[tuple[str, str], ...] = ()
-
-    @property
-    def stopped(self) -> str:
-        """Why all boats are told to stop; empty: they are not."""
-        return self._stopped
-
-    @property
-    def hard(self) -> bool:
-        """Whether they are stopped by their links, past the shield: STOP ALL was asked for twice."""
-        return self._hard
-
-    @property
-    def ended(self) -> str:
-        """Why the run is to end; empty: it goes on."""
-        return self._ended
 
     def stop_all(self, by: str = "operator") -> None:
         """Tell all boats to stop, at every tick, until `resume`.
@@ -70,14 +62,14 @@ class Operator:
         they stop by their links' surest way, whatever is near.
         """
         with self._lock:
-            self._hard = bool(self._stopped)
-            self._stopped = by
-        LOG.warning("STOP ALL by %s%s", by, ", past the shield" if self._hard else "")
+            self.hard = bool(self.stopped)
+            self.stopped = by
+        LOG.warning("STOP ALL by %s%s", by, ", past the shield" if self.hard else "")
 
     def resume(self, by: str = "operator") -> None:
         """Take STOP ALL back."""
         with self._lock:
-            self._stopped, self._hard = "", False
+            self.stopped, self.hard = "", False
         LOG.warning("STOP ALL taken back by %s", by)
 
     def take_back(self, boat: str, by: str = "operator") -> None:
@@ -95,18 +87,11 @@ class Operator:
     def end(self, by: str = "operator") -> None:
         """End the run: boats are left stopped."""
         with self._lock:
-            self._ended = by
+            self.ended = by
         LOG.warning("end of the run asked for by %s", by)
 
     def override(self, condition: str, subject: str, seconds: float, now_s: float, by: str = "operator") -> Override:
-        """Switch a declared response off for a while.
-
-        Args:
-            condition: one of `DISABLES`.
-            subject: boat or contact; empty: all.
-            seconds: for how long, at most `LONGEST_OVERRIDE_S`.
-            now_s: the loop's clock.
-            by: who asks.
+        """Switch a declared response off for a while, at most `LONGEST_OVERRIDE_S`; see `Override`.
 
         Raises:
             ConfigError: it cannot be overridden, or not for so long.
@@ -119,7 +104,7 @@ class Operator:
         with self._lock:
             kept = [entry for entry in self._overrides if (entry.condition, entry.subject) != (condition, subject)]
             self._overrides = (*kept, made)
-        LOG.warning("override of %s for %g s by %s: disables %s", self._name(made), seconds, by, DISABLES[condition])
+        LOG.warning("override of %s for %g s by %s: disables %s", made.name, seconds, by, made.disables)
         return made
 
     def active(self, now_s: float) -> tuple[Override, ...]:
@@ -129,25 +114,15 @@ class Operator:
             if ended:
                 self._overrides = tuple(entry for entry in self._overrides if entry.until_s > now_s)
         for entry in ended:
-            LOG.warning("override of %s ended", self._name(entry))
+            LOG.warning("override of %s ended", entry.name)
         return self._overrides
 
     def actions(self, now_s: float) -> tuple[Action, ...]:
         """What is in force, for the record and the display."""
-        past = ", past the shield" if self._hard else ""
-        stop = [Action("all", "stop_all", "stop", f"STOP ALL by {self._stopped}{past}")] if self._stopped else []
-        overrides = [
-            Action(
-                entry.subject or "all",
-                "override",
-                entry.condition,
-                f"override of {self._name(entry)} for {entry.until_s - now_s:.0f} s more: disables "
-                f"{DISABLES[entry.condition]}",
-            )
-            for entry in self.active(now_s)
-        ]
+        past = ", past the shield" if self.hard else ""
+        stop = [Action("all", "stop_all", "stop", f"STOP ALL by {self.stopped}{past}")] if self.stopped else []
+        overrides = []
+        for entry in self.active(now_s):
+            text = f"override of {entry.name} for {entry.until_s - now_s:.0f} s more: disables {entry.disables}"
+            overrides.append(Action(entry.subject or "all", "override", entry.condition, text))
         return (*stop, *overrides)
-
-    @staticmethod
-    def _name(entry: Override) -> str:
-        return f"{entry.condition} {entry.subject}".strip()

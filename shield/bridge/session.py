@@ -1,14 +1,15 @@
-"""`VehicleSession`: every socket and file of a runner, opened from a fleet file and given back together."""
+"""`VehicleSession`: every socket and file of a runner, opened from a fleet file and given back together.
+
+The one place where a link is chosen is `LINK_MAKERS`, by the ``kind`` of a boat's link in FLEET.yaml.
+"""
 
 from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from types import TracebackType
 
-from ..compat import Self
 from ..surroundings import OPEN_WATER, Surroundings
 from .blackbox import TlogWriter, log_path
 from .clock import Clock
@@ -16,8 +17,11 @@ from .control_loop import Parts
 from .feed import FeedReceiver
 from .fleet_file import FleetFile
 from .fleet_settings import BoatSettings
-from .links import LINK_MAKERS, key_of
-from .messages import Contact, ContactSource, Link, LinkMaker, TickSink, WantedSource, contact_of
+from .mavlink.connection import Endpoint, OnBytes
+from .mavlink.signing import Signing, read_key
+from .mavlink.vehicle import MavlinkLink
+from .messages import Closing, Contact, ContactSource, Link, LinkMaker, TickSink, WantedSource, contacts_heard
+from .moos.links import MoosLinks
 
 LOG = logging.getLogger(__name__)
 
@@ -26,7 +30,7 @@ PREPARE_S = 60.0
 """An autopilot arms up to 42 s after it was switched on."""
 
 
-class VehicleSession:
+class VehicleSession(Closing):
     """Links to the boats a process commands, links it only listens to, and the feed. A context manager.
 
     Nothing is sent to any boat before `connect`. Leaving it stops every boat it prepared, verifies that, and gives
@@ -37,12 +41,14 @@ class VehicleSession:
         boat: name of this process's boat, or None for all of the team.
         clock: the loop's.
         tlog: whether raw packets are kept in the log folder.
-        begun_unix_s: time, s since 1970, that this run's files are named after; None: now.
+        begun_unix_s: time that this run's files are named after, s since 1970; None: now.
 
     Attributes:
         links: to the boats this process commands, by name.
         ears: links that are only listened to, by name.
+        feed: hears it; None: the file has none.
         key: signing key, 32 bytes; None: nothing is signed.
+        left: what each boat was left doing, once closed.
 
     Raises:
         FleetFileError: there is nothing to command.
@@ -58,16 +64,20 @@ class VehicleSession:
         self.begun_unix_s = time.time() if begun_unix_s is None else begun_unix_s
         commanded = fleet.commanded(boat)
         self.key = key_of(fleet)
-        self._makers: dict[str, LinkMaker] = {}
-        self._tlog: TlogWriter | None = None
+        self.links: dict[str, Link] = {}
+        self.ears: dict[str, Link] = {}
         self.feed: FeedReceiver | None = None
         self.left: tuple[str, ...] = ()
-        """What each boat was left doing, once closed."""
+        self._makers: dict[str, LinkMaker] = {}
+        self._tlog: TlogWriter | None = None
         try:
             if tlog:
                 self._tlog = TlogWriter(log_path(fleet.log_dir, ".tlog", self.begun_unix_s))
-            self.links = {entry.name: self._link(entry) for entry in commanded}
-            self.ears = {entry.name: self._link(entry) for entry in self._heard_only(commanded)}
+            for entry in fleet.boats:
+                if entry in commanded:
+                    self.links[entry.name] = self._link(entry)
+                elif entry.link is not None and fleet.contact_of(entry) == "telemetry":
+                    self.ears[entry.name] = self._link(entry)
             listen = fleet.feed_listen(boat)
             if fleet.feed is not None and listen is not None:
                 self.feed = FeedReceiver(listen, fleet.frame, clock, fleet.feed.allow, fleet.names, self.key)
@@ -83,7 +93,7 @@ class VehicleSession:
         Raises:
             LinkError: a boat does not answer.
         """
-        self._all({**self.links, **self.ears}, lambda link: link.connect(timeout_s))
+        _all({**self.links, **self.ears}, lambda link: link.connect(timeout_s))
 
     def prepare(self, timeout_s: float = PREPARE_S) -> None:
         """Bring every commanded boat to where it obeys, all at once.
@@ -92,7 +102,7 @@ class VehicleSession:
             LinkRefused: an autopilot says no.
             LinkError: no answer.
         """
-        self._all(self.links, lambda link: link.prepare(timeout_s))
+        _all(self.links, lambda link: link.prepare(timeout_s))
 
     def sources(self) -> tuple[ContactSource, ...]:
         """Who tells of other boats: the feed, and what comes by the way of the links."""
@@ -101,10 +111,7 @@ class VehicleSession:
 
     def contacts(self) -> tuple[Contact, ...]:
         """Boats heard of by these sources and by links that are only listened to."""
-        error = self.fleet.shield_config.position_error_m
-        told = [contact_of(link.read(), error) for link in self.ears.values()]
-        heard = [contact for source in self.sources() for contact in source.read()]
-        return (*heard, *(contact for contact in told if contact is not None))
+        return contacts_heard(self.sources(), self.ears, self.fleet.shield_config.position_error_m)
 
     def parts(
         self,
@@ -114,56 +121,22 @@ class VehicleSession:
         *,
         plays: bool = False,
     ) -> Parts:
-        """What a control loop on these boats works with.
-
-        Args:
-            nominal: where nominal commands come from.
-            sinks: get every tick.
-            grounds: static constraints of the game.
-            plays: whether the referee's state of the game counts.
-        """
-        return Parts(
-            links=self.links,
-            policy=nominal,
-            ears=self.ears,
-            contacts=self.sources(),
-            game=self.feed if plays else None,
-            grounds=grounds,
-            sinks=tuple(sinks),
-        )
+        """What a control loop on these boats works with; ``plays``: whether the referee's state of the game counts."""
+        game = self.feed if plays else None
+        return Parts(self.links, nominal, self.ears, self.sources(), game, grounds, tuple(sinks))
 
     def close(self) -> None:
         """Stop every boat, verify it, and give everything back; may be called again."""
-        links: dict[str, Link] = {**getattr(self, "links", {}), **getattr(self, "ears", {})}
-        ears = getattr(self, "ears", {})
-        if links and not self.left:
-            with ThreadPoolExecutor(len(links)) as pool:
-                texts = list(pool.map(_leave, [link for name, link in links.items() if name not in ears]))
-            for link in ears.values():
+        if self.links and not self.left:
+            with ThreadPoolExecutor(len(self.links)) as pool:
+                self.left = tuple(pool.map(_leave, self.links.values()))
+            for link in self.ears.values():
                 link.release()
-            self.left = tuple(texts)
         for maker in self._makers.values():
             maker.close()
-        if self.feed is not None:
-            self.feed.close()
-        if self._tlog is not None:
-            self._tlog.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-    def _heard_only(self, commanded: Iterable[BoatSettings]) -> list[BoatSettings]:
-        names = {entry.name for entry in commanded}
-        return [
-            entry
-            for entry in self.fleet.boats
-            if entry.link is not None and entry.name not in names and self.fleet.contact_of(entry) == "telemetry"
-        ]
+        for opened in (self.feed, self._tlog):
+            if opened is not None:
+                opened.close()
 
     def _link(self, boat: BoatSettings) -> Link:
         kind = "" if boat.link is None else boat.link.kind
@@ -172,18 +145,18 @@ class VehicleSession:
             self._makers[kind] = LINK_MAKERS[kind](self.fleet, self.clock, on_bytes)
         return self._makers[kind].link(boat)
 
-    @staticmethod
-    def _all(links: Mapping[str, Link], work: Callable[[Link], None]) -> None:
-        """Do something slow with all links at the same time; the first that fails is told, after all are done."""
-        if not links:
-            return
-        with ThreadPoolExecutor(len(links)) as pool:
-            futures = [pool.submit(work, link) for link in links.values()]
-        errors = [error for error in (future.exception() for future in futures) if error is not None]
-        for error in errors[1:]:
-            LOG.error("%s", error)
-        if errors:
-            raise errors[0]
+
+def _all(links: Mapping[str, Link], work: Callable[[Link], None]) -> None:
+    """Do something slow with all links at the same time; the first that fails is told, after all are done."""
+    if not links:
+        return
+    with ThreadPoolExecutor(len(links)) as pool:
+        futures = [pool.submit(work, link) for link in links.values()]
+    errors = [error for error in (future.exception() for future in futures) if error is not None]
+    for error in errors[1:]:
+        LOG.error("%s", error)
+    if errors:
+        raise errors[0]
 
 
 def _leave(link: Link) -> str:
@@ -192,3 +165,63 @@ def _leave(link: Link) -> str:
     except Exception as error:  # the other boats must still be stopped
         LOG.exception("%s: not left in order", link.boat)
         return f"{link.boat}: not left in order ({error}); it stops by its own time-out"
+
+
+class MavlinkLinks(LinkMaker):
+    """A `LinkMaker`: one `Endpoint` an address, shared by the boats behind it; ``on_bytes`` gets every whole frame.
+
+    Raises:
+        ConfigError: the signing key cannot be read, or others can read it.
+    """
+
+    def __init__(self, fleet: FleetFile, clock: Clock, on_bytes: OnBytes | None) -> None:
+        self._fleet, self._clock, self._on_bytes = fleet, clock, on_bytes
+        self._signing = signing_of(fleet)
+        self._endpoints: dict[str, Endpoint] = {}
+
+    def link(self, boat: BoatSettings) -> MavlinkLink:
+        """See `LinkMaker`."""
+        settings = boat.link
+        if settings is None:
+            raise ValueError(f"boat {boat.name} has no link")
+        endpoint = self._endpoints.get(settings.address)
+        if endpoint is None:
+            endpoint = Endpoint(settings.address, self._clock, signing=self._signing, on_bytes=self._on_bytes)
+            self._endpoints[settings.address] = endpoint
+        frame, rate_hz, route = self._fleet.frame, settings.rate_hz, settings.route
+        return MavlinkLink(boat.name, endpoint, settings.system_id, frame, self._clock, rate_hz=rate_hz, route=route)
+
+    def open(self) -> None:
+        """See `LinkMaker`."""
+        for endpoint in self._endpoints.values():
+            endpoint.open()
+
+    def close(self) -> None:
+        """See `LinkMaker`."""
+        for endpoint in self._endpoints.values():
+            endpoint.close()
+
+
+LINK_MAKERS: Mapping[str, Callable[[FleetFile, Clock, OnBytes | None], LinkMaker]] = {
+    "mavlink": MavlinkLinks,
+    "moos": MoosLinks,
+}
+
+
+def signing_of(fleet: FleetFile) -> Signing | None:
+    """Key and link number of a file; None: it has no signing.
+
+    Raises:
+        ConfigError: the key cannot be read, or others can read it.
+    """
+    return None if fleet.signing is None else Signing(read_key(fleet.signing.key_file), fleet.signing.link_id)
+
+
+def key_of(fleet: FleetFile) -> bytes | None:
+    """The key alone.
+
+    Raises:
+        ConfigError: as `signing_of`.
+    """
+    signing = signing_of(fleet)
+    return None if signing is None else signing.key

@@ -16,15 +16,13 @@ from steerclear.experiments.ablation import (
     held_games,
     most_instructive,
     pairings_of,
-    quick,
     replay_of,
     results_of,
-    same_game,
     spec_of,
     write_results,
 )
 from steerclear.experiments.docs import write_pages
-from steerclear.experiments.docs_keys import GAME_ROW, RESULTS, undocumented
+from steerclear.experiments.docs_keys import KEYS, undocumented
 from steerclear.experiments.markdown import goals_table as goals_lines
 from steerclear.experiments.metrics import check, game_goals, game_metrics_of
 from steerclear.experiments.play.spec import MatchSpec
@@ -60,11 +58,6 @@ def test_every_pairing_is_played_off_and_on_from_the_same_seeds():
     assert [MatchSpec.of_job(json.loads(json.dumps(spec.as_job()))) for spec in specs] == specs
 
 
-def test_the_separation_is_counted_beside_the_usual_radii():
-    assert AblationSettings(shield={"separation_m": 3.0}).radii_m == (2.5, 3.0, 4.0)
-    assert AblationSettings().radii_m == (2.5, 4.0)
-
-
 def test_a_game_of_a_policy_whose_file_changed_is_another_game(tmp_path):
     entry = tmp_path / "entry.py"
     entry.write_text("SPEED = 1")
@@ -79,7 +72,7 @@ def test_games_come_back_in_order_with_documented_columns(played):
     assert [(row["game"], row["opponent"], row["shielded"]) for row in played.rows] == [
         (game, opponent, shielded) for game in (0, 1) for opponent in ("easy", "hold") for shielded in (False, True)
     ]
-    assert undocumented(played.rows[1], GAME_ROW) == []
+    assert undocumented(played.rows[1], KEYS["rows of ablate"]) == []
 
 
 THREE = AblationSettings(opponents=("easy",), games=1, rules={"max_time_s": 3.0}, shield_autopilot=False, covered=True)
@@ -119,7 +112,7 @@ def test_both_figures_are_in_results_tables_and_pages_and_goals_are_of_the_first
     assert "hits driven 2.5 m" in text
     write_results(run, results)
     content = json.loads((run.folder / "results.json").read_text())
-    assert undocumented(content, RESULTS) == []
+    assert undocumented(content, KEYS["ablate"]) == []
     assert "covered − off, paired" in (run.folder / "report.html").read_text()
     (page,) = (path for path in write_pages([content], tmp_path / "docs") if path.name == "ablation_aamas2024.md")
     assert "| shield off | shield on | on - off, paired | covered | covered - off, paired |" in page.read_text()
@@ -226,7 +219,7 @@ def test_results_are_written_whole_and_documented(played, tmp_path):
     results["replay"] = entry
     write_results(played, results, records)
     content = json.loads((played.folder / "results.json").read_text())
-    assert undocumented(content, RESULTS) == []
+    assert undocumented(content, KEYS["ablate"]) == []
     assert (content["complete"], content["replay"]["same_as_played"]) == (True, True)
     assert content["settings"]["opponents"] == ["easy", "hold"]
     assert content["seeds"] == [0, 1]
@@ -257,17 +250,6 @@ def test_one_state_alone_has_neither_differences_nor_goals(played, tmp_path):
     content = {**finite(results), "command": "evaluate"}
     (page,) = (path for path in write_pages([content], tmp_path) if path.name == "evaluation_aamas2024.md")
     assert "shield off" not in page.read_text()
-
-
-def test_the_same_game_is_known_whatever_time_it_took(played):
-    row = played.rows[1]
-    assert same_game(row, {**row, "wall_s": 99.0})
-    assert not same_game(row, {**row, "captures": 99})
-
-
-def test_the_small_version_keeps_everything_but_size():
-    small = quick(SETTINGS, 30.0, 1)
-    assert (small.games, small.rules, small.opponents) == (1, {"max_time_s": 30.0}, SETTINGS.opponents)
 
 
 def test_settings_without_end_stay_so_in_results(tmp_path):
@@ -373,14 +355,6 @@ def test_a_goal_just_missed_does_not_look_as_if_it_were_met():
     assert "0.0033 <= 0.00 not met" in " ".join(printed(goals_table([missed]), 80).split())
     assert "| hits | 0.0033 | <= 0.00 | **not met** |" in goals_lines([missed])
     assert goal_rows([missed])[0]["measured"] == "0.0033 [0.00, 0.02]"
-
-
-def test_a_long_name_of_a_goal_takes_nothing_from_its_figures():
-    goal = {"name": "shield:opponent_model=value_table: " + "many words " * 6, "sense": "<=", "limit": 0.0}
-    shown = printed(goals_table([goal | {"value": 1234.0, "met": met} for met in (False, None)]), 80)
-    for words in ("measured", "1,234 <= 0.00 not met", "1,234 <= 0.00 no data"):
-        assert words in shown
-    assert shown.split().count("words") == 12
 
 
 def failing(own=0, other=0, text=None, usable=(7, 7), steps=10):

@@ -16,55 +16,7 @@ from steerclear.experiments import cli
 from steerclear.experiments.console import ExitCode
 from typer.testing import CliRunner
 
-ALL = """
-ablate: --address --answer-time --certificate --opponent-model --check --current --delay --engine --fixed-start
-    --games --jobs --json --judge --max-time --no-shield-autopilot --noise --opponents --out --own --penalty
-    --platform --preset --profile --quick --resume --seed --separation --set --shield-set --solver --trust
-attack: --address --attackers --current --delay --engine --generations --guard --jobs --json --noise --out --own
-    --platform --population --radius --replay --restarts --resume --seed --workers
-bench: --check --json --preset --quick --seed
-compare: --json first second
-demonstrate: --max-time --no-shield --opponent --out --preset --seed --shield --side --speed
-deploy: --accept --boat --demo --json --link --minutes --no-tlog --opponents --plain --policy --seed --speed --trust
-    --wait fleet
-docs: --out sources
-encounters: --address --current --delay --engine --family --guard --jobs --json --n --no-judge --noise --out
-    --platform --radius --resume --scene --seed --workers
-entry check: --answer-time --json --max-time --preset entry
-entry report: --address --also --answer-time --engine --games --jobs --json --judge --looks --max-time --opponents
-    --out --platform --preset --profile --quick --resume --seed --separation --set --shield-set entry
-entry wrap: --json --out --preset --profile --separation --shield-set entry
-evaluate: --address --answer-time --certificate --opponent-model --current --delay --engine --fixed-start --games
-    --jobs --json --judge --max-time --no-shield --no-shield-autopilot --noise --opponents --out --penalty --platform
-    --preset --profile --quick --resume --seed --separation --set --shield --shield-set --solver --trust policy
-export: --interval --out --submission model
-fit: --boat --json --kind --name --out --plot --system-id logs
-parity: --jobs --json traces
-platform check: name
-platform new: --from --out name
-platform show: name
-play: --answer-time --certificate --opponent-model --current --delay --fixed-start --headless --json --keyboard
-    --max-time --no-shield --no-shield-autopilot --noise --opponent --own --penalty --platform --preset --profile
-    --save --seed --separation --set --shield --shield-set --side --solver --speed --trust --window
-preflight: --accept --boat --json --no-drill --no-tlog --speed --wait fleet
-reach check: files
-reach compare: --json --other --own --radius --shield-set
-reach play: --jobs --json --other --out --own --radius --resume --shield-set
-reach show: --file --other --other-may --own --picture --radius
-reach solve: --checkpoint --horizon --jobs --other --other-may --out --own --quick --radius
-referee: --json --links --listen --minutes --publish --rate --speed --with-parent fleet
-render: --at --json --speed --to records
-replay: --html --json --judge --key --mend --no-judge --record --without-shield log
-sea-trial: --accept --boat --max-speed --no-tlog --only --speed --wait fleet
-sim-boats: --allow-remote --boot --check --current --delay --demo --duration --fault --jitter --json --loss --no-wait
-    --noise --off --opponents --random-start --really --record --seed --speed --wind --with-parent fleet
-tournament: --address --answer-time --check --engine --finalists --fixed-start --jobs --json --judge --max-time
-    --no-replays --out --penalty --platform --preset --profile --qualifying --quick --repetitions --replays --resume
-    --seed --separation --set --shield --shield-set --teams --trust
-train: --out --resume config
-train-study: --games --jobs --out --seeds config
-warm-up:
-"""
+ALL = (Path(__file__).parents[1] / "data" / "commands.txt").read_text(encoding="utf-8")
 """Every command with its options and arguments: public, so that none goes without a word."""
 
 

@@ -7,7 +7,7 @@ import pytest
 from steerclear.experiments.cli import app
 from steerclear.experiments.compare_runs import compare_runs, differs, read_run
 from steerclear.experiments.console import ExitCode
-from steerclear.experiments.docs_keys import COMPARE, undocumented
+from steerclear.experiments.docs_keys import KEYS, undocumented
 from steerclear.experiments.result_files import write_json
 from steerclear.experiments.runner import append_row, job_id
 from steerclear.shield.exceptions import ConfigError
@@ -160,4 +160,4 @@ def test_the_command_shows_the_table_and_writes_what_is_documented(folders, tmp_
     assert "against easy: 3 pairs" in done.stdout
     assert "1.00 [0.00, 2.0]" in done.stdout
     assert "fewer than 20 pairs say little" in done.stdout
-    assert undocumented(json.loads(file.read_text()), COMPARE) == []
+    assert undocumented(json.loads(file.read_text()), KEYS["compare"]) == []

@@ -50,18 +50,6 @@ def test_counts_add_up_and_means_are_weighted():
     assert figures["breached_upper"] > 5 / 400
 
 
-def test_a_total_of_results_that_do_not_all_tell_who_never_arrived_is_unknown():
-    told = (
-        cell("a", "circle_3", n=100, never_arrived_percent=40.0),
-        cell("a", "head_on", n=300, never_arrived_percent=0),
-    )
-    figures = one_contest(content(*told)).totals["a"]
-    assert figures["never_arrived_percent"] == pytest.approx(10.0)
-    older = one_contest(content(*told, cell("a", "rammer_1"))).totals["a"]
-    assert older["never_arrived_percent"] is None
-    assert older["encounters"] == 500
-
-
 def test_the_page_is_made_of_older_results_beside_newer_ones(tmp_path):
     newer = content(
         cell("new", "head_on", never_arrived_percent=40.0), cell("new", "rammer_1", never_arrived_percent=0.0)

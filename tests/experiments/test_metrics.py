@@ -1,17 +1,21 @@
 """Adding to the experiments: a metric in one line, an experiment in one file, as CONTRIBUTING shows."""
 
 import json
+from dataclasses import fields
+from pathlib import Path
 
 import numpy as np
 import pytest
 from steerclear.env.record import read_meta
 from steerclear.experiments import docs_keys, metrics
 from steerclear.experiments.ablation import AblationSettings, results_of, write_results
-from steerclear.experiments.metrics import Goal, Metric, check, game_metrics_of, meanings_of
+from steerclear.experiments.docs import keys_page
+from steerclear.experiments.metrics import Goal, Metric, check, game_metrics_of
 from steerclear.experiments.report import Report, Section, Table
 from steerclear.experiments.runner import Experiment, execute
-from steerclear.experiments.statistics import as_figure, count_interval, mean_interval, summarise
+from steerclear.experiments.statistics import count_interval, mean_interval, summarise
 from steerclear.experiments.tables import interval_text, pairing_table
+from steerclear.shield import ShieldConfig
 from steerclear.shield.decision import Reason
 from steerclear.shield.exceptions import ConfigError
 from test_ablation import printed
@@ -37,7 +41,7 @@ def test_a_metric_of_one_line_reaches_rows_table_report_and_keys(monkeypatch, tm
     assert "lowest speed of an own boat" in page
     assert interval_text(figures["on"]) in page
     content = json.loads((tmp_path / "results.json").read_text())
-    assert docs_keys.undocumented({"pairings": content["pairings"]}, docs_keys.RESULTS) == []
+    assert docs_keys.undocumented({"pairings": content["pairings"]}, docs_keys.KEYS["ablate"]) == []
 
 
 THROWS = [Metric("hit", "share", "hits", "", "whether it hit"), Metric("off_m", "mean", "off by", "m", "distance")]
@@ -71,16 +75,29 @@ def test_a_kind_of_metric_that_there_is_not_is_refused(tmp_path):
     run = execute(Experiment("throw", {}, [{"hand": "left", "scale": 1.0}], throw), tmp_path)
     with pytest.raises(ConfigError, match="unknown kind of metric 'median'; choose count, share, mean, percent or"):
         summarise(run.table, [Metric("off_m", "median", "", "", "")], ["hand"])
-    assert as_figure(count_interval(0, 2), 2)["n"] == 2
 
 
 def test_every_metric_says_what_it_is_and_keys_are_no_two_alike():
     keys = [metric.key for metric in game_metrics_of()]
     assert len(set(keys)) == len(keys)
-    assert all(len(words.split()) >= 2 and not words.endswith(".") for words in meanings_of(game_metrics_of()).values())
+    assert all(
+        len(words.split()) >= 2 and not words.endswith(".") for words in (one.meaning for one in game_metrics_of())
+    )
 
 
 def test_every_reason_for_which_a_command_is_changed_has_a_meaning():
     assert {name.lower() for name in Reason.__members__} - {"passed", "not_covered"} <= set(metrics.REASONS)
     assert Reason["ESCAPE"] is Reason.BACKUP, "the name in results of 0.2.0 and before"
     assert Reason["QP"] is Reason.LEAST_CHANGE, "the name in logs of 0.8.0 and before"
+
+
+def test_the_page_names_every_metric_of_a_game():
+    page = keys_page()
+    for metric in game_metrics_of((2.5,)):
+        assert f"`{metric.name}" in page or metric.column in page, metric
+
+
+def test_the_page_of_settings_has_all_there_are_and_no_other():
+    text = (Path(__file__).parents[2] / "docs" / "settings.md").read_text(encoding="utf-8")
+    named = [line.split("`")[1] for line in text.splitlines() if line.startswith("| `")]
+    assert sorted(named) == sorted(entry.name for entry in fields(ShieldConfig))

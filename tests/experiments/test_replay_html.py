@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from steerclear.env.record import make_record, read_meta
 from steerclear.experiments.page import as_json
-from steerclear.experiments.replay_data import pack
-from steerclear.experiments.replay_html import SCRIPTS, write_replay
+from steerclear.experiments.replay_html import SCRIPTS, pack, write_replay
 from steerclear.shield.exceptions import ConfigError, TraceError
 
 NODE = shutil.which("node")
@@ -50,7 +49,7 @@ def games_in(path):
 
 
 def decode(game):
-    """Read the embedded numbers as replay_data.py describes them, independently of the page's own reader."""
+    """Read the embedded numbers as replay_html.py describes them, independently of the page's own reader."""
     content = base64.b64decode(game["data"])
     content = zlib.decompress(content) if game["deflated"] else content
     codes, values = {}, {}

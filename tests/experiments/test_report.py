@@ -72,13 +72,6 @@ def test_the_report_says_which_states_were_played(states, title, played, results
     assert f"7 games, {played} ·" in text
 
 
-@pytest.mark.parametrize("quick", [True, False])
-def test_the_small_version_is_called_so(quick, results, tmp_path):
-    results["quick"] = quick
-    text = write_report(results, tmp_path / "report.html").read_text()
-    assert ("small version (--quick)" in text) is quick
-
-
 def test_the_report_shows_what_it_was_given(results, tmp_path):
     text = write_report(results, tmp_path / "deep" / "report.html").read_text()
     hits, teammates, captures, closest, changed, reasons = plots_in(text)
@@ -136,13 +129,6 @@ def test_only_shielded_games_are_a_report_too(results, tmp_path):
     text = write_report(results, tmp_path / "report.html").read_text()
     assert painted(plots_in(text)[0], "off") == 0
     assert 'class="arrow"' not in text
-
-
-def test_what_is_not_needed_may_be_left_out(results, tmp_path):
-    for name in ("goals", "replays", "machine", "something new"):
-        del results[name]
-    text = write_report(results, tmp_path / "report.html").read_text()
-    assert "verdict" not in text.split("</style>")[1]
 
 
 def test_plots_without_data_and_with_long_labels_are_still_plots():

@@ -1,6 +1,5 @@
 """The runner: what is kept on disk, by whom, of which code; where jobs run; how a run ends and is gone on with."""
 
-import errno
 import json
 import os
 import re
@@ -162,14 +161,6 @@ def test_a_folder_of_something_else_is_refused_and_left_as_it_was(tmp_path):
         execute(experiment(""), tmp_path)
 
 
-@pytest.mark.parametrize("resume", [False, True])
-def test_results_of_an_earlier_version_are_refused_by_its_name(tmp_path, resume):
-    (tmp_path / "games.jsonl").write_text("{}\n")
-    (tmp_path / "results.json").write_text('{"command": "test", "versions": {"steerclear": "0.7.3"}}')
-    with pytest.raises(ConfigError, match=r"steerclear 0\.7\.3, which this version reads \(compare, docs\)"):
-        execute(experiment(""), tmp_path, resume=resume)
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX files")
 @pytest.mark.parametrize("make", [os.mkfifo, os.mkdir])
 def test_what_is_no_plain_file_is_refused_at_once(tmp_path, make):
@@ -185,19 +176,6 @@ def test_a_folder_that_cannot_be_written_to_is_one_clear_error(tmp_path):
     (tmp_path / "rows.jsonl").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(ConfigError, match=r"cannot read .*rows.jsonl .*is no text.*move it away"):
         execute(experiment(""), tmp_path, resume=True)
-
-
-def test_a_full_disk_keeps_what_is_there(tmp_path, monkeypatch):
-    execute(experiment(""), tmp_path)
-    before = lines_of(tmp_path).read_bytes()
-
-    def full(descriptor):
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    monkeypatch.setattr(runner.os, "fsync", full)
-    with pytest.raises(ConfigError, match="what it holds is kept: make room, then --resume"):
-        execute(experiment("", ""), tmp_path, resume=True)
-    assert lines_of(tmp_path).read_bytes() == before
 
 
 SCRIPT = """

@@ -42,13 +42,6 @@ def test_garwood_limits_match_the_published_table(events, low, high):
     assert (interval.low, interval.high) == pytest.approx((low, high), abs=1e-3)
 
 
-def test_zero_events_have_the_rule_of_three_as_upper_limit():
-    interval = count_interval(0, exposure=20)
-    assert interval.value == interval.low == 0.0
-    assert interval.high == pytest.approx(-math.log(0.05) / 20)
-    assert interval.high == pytest.approx(3 / 20, rel=0.01)
-
-
 @given(st.integers(1, 400), st.floats(0.1, 100.0))
 def test_garwood_limits_are_the_tails_of_the_poisson_distribution(events, exposure):
     interval = count_interval(events, exposure)

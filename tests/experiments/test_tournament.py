@@ -9,7 +9,6 @@ from steerclear.experiments.docs_keys import KEYS, undocumented
 from steerclear.experiments.rankings import qualifying_table, seats
 from steerclear.experiments.runner import job_id
 from steerclear.experiments.tournament import TournamentSettings, label, names_of, play_game, results_of
-from steerclear.experiments.tournament_keys import TOURNAMENT_GAME
 from steerclear.experiments.tournament_pages import chosen_games, subtitle, write_html, write_markdown
 from steerclear.shield.exceptions import ConfigError
 
@@ -96,7 +95,7 @@ def test_results_rows_report_and_page_hold_what_they_say(tmp_path):
     run = play(settings(), tmp_path / "run")
     content = json.loads(json.dumps(results_of(run, settings()), default=str))
     assert undocumented(content, KEYS["tournament"]) == []
-    assert undocumented(run.rows[0], TOURNAMENT_GAME) == []
+    assert undocumented(run.rows[0], KEYS["rows of tournament"]) == []
     html = write_html(content, tmp_path / "report.html").read_text()
     name, text, pictures = write_markdown(content, tmp_path)
     assert (name, pictures) == ("tournament_aamas2024.md", [])

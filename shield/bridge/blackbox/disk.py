@@ -14,7 +14,7 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, TypeVar
 
 from ...exceptions import BridgeError
 from ..preflight_checks import CheckResult
@@ -33,17 +33,17 @@ SLOWEST_SYNC_S = 0.5
 _CHUNK = 64 * 1024
 
 Item = TypeVar("Item")
-Taken = TypeVar("Taken", contravariant=True)
 
 
+_ELSEWHERE = "set log_dir to another disk"
 _MEANINGS = {
-    errno.ENOSPC: ("the disk is full", "free space on it or set log_dir to another disk"),
-    errno.EDQUOT: ("the disk quota is used up", "free space or set log_dir to another disk"),
-    errno.EFBIG: ("the file may not grow any further", "raise the limit on file sizes or set log_dir to another disk"),
+    errno.ENOSPC: ("the disk is full", f"free space on it or {_ELSEWHERE}"),
+    errno.EDQUOT: ("the disk quota is used up", f"free space or {_ELSEWHERE}"),
+    errno.EFBIG: ("the file may not grow any further", f"raise the limit on file sizes or {_ELSEWHERE}"),
     errno.EROFS: ("the disk is read-only", "set log_dir to a disk that can be written"),
     errno.EACCES: ("writing there is not allowed", "set log_dir to a folder you may write to"),
     errno.EPERM: ("writing there is not allowed", "set log_dir to a folder you may write to"),
-    errno.EIO: ("the disk fails", "set log_dir to another disk"),
+    errno.EIO: ("the disk fails", _ELSEWHERE),
     errno.EEXIST: ("the file exists already", "give a name that is not taken"),
     errno.ENOENT: ("the folder does not exist", "create it or set log_dir to another folder"),
     errno.ENOTDIR: ("the folder is a file", "set log_dir to a folder"),
@@ -52,10 +52,8 @@ _MEANINGS = {
 
 def explain(error: OSError) -> str:
     """What an error of the file system means, and the remedy, in one line."""
-    meaning, remedy = _MEANINGS.get(
-        error.errno or 0, (f"writing failed ({error.strerror or error})", "set log_dir to another disk")
-    )
-    return f"{meaning}; {remedy}"
+    unknown = (f"writing failed ({error.strerror or error})", _ELSEWHERE)
+    return "; ".join(_MEANINGS.get(error.errno or 0, unknown))
 
 
 class Disk:
@@ -124,20 +122,26 @@ class Disk:
             self._file = None
 
 
-class Store(Protocol[Taken]):
-    """What the thread does with things; only ever called from that thread."""
+class Store(Generic[Item]):
+    """What the writer's thread, and nobody else, does with things, and the file it keeps them in."""
 
-    def keep(self, item: Taken) -> None:
+    def __init__(self, disk: Disk) -> None:
+        self.disk = disk
+
+    def keep(self, item: Item) -> None:
         """Take one thing."""
+        raise NotImplementedError
 
     def flush(self) -> None:
         """Bring what was taken to the disk."""
+        self.disk.flush()
+        self.disk.sync()
 
     def finish(self) -> None:
         """Complete and close the file."""
-
-    def abandon(self) -> None:
-        """Close the file as it is."""
+        self.disk.flush()
+        self.disk.sync()
+        self.disk.close()
 
 
 class AsyncWriter(Generic[Item]):
@@ -182,9 +186,13 @@ class AsyncWriter(Generic[Item]):
         try:
             self._queue.put_nowait((active_s, item))
         except queue.Full:
-            self._drop()
+            if self.dropped == 0:
+                LOG.warning(
+                    "the log %s: the disk is too slow, %d entries wait, more are dropped", self.name, self.waiting
+                )
+            self.dropped += 1
         stuck_s = active_s - self._progress_s
-        if stuck_s > self._give_up_s and self._queue.qsize() > 1:
+        if stuck_s > self._give_up_s and self.waiting > 1:
             raise BridgeError(
                 f"the log {self.name}: the disk has taken nothing for {stuck_s:.0f} s; check it or set log_dir to "
                 "another disk"
@@ -215,11 +223,6 @@ class AsyncWriter(Generic[Item]):
         """Time in which things were handed over, s: see `PAUSE_S`."""
         active_s, handed_s = self._handed
         return active_s + min(time.monotonic() - handed_s, PAUSE_S)
-
-    def _drop(self) -> None:
-        if self.dropped == 0:
-            LOG.warning("the log %s: the disk is too slow, %d entries wait, more are dropped", self.name, self.waiting)
-        self.dropped += 1
 
     def _run(self) -> None:
         try:
@@ -256,42 +259,24 @@ class AsyncWriter(Generic[Item]):
 
     def _next(self, wait_s: float) -> tuple[float, Item] | None:
         try:
-            return self._queue.get(timeout=max(0.0, wait_s)) if wait_s > 0.0 else self._queue.get_nowait()
+            return self._queue.get(block=wait_s > 0.0, timeout=max(0.0, wait_s))
         except queue.Empty:
             return None
 
     def _fail(self, fault: str) -> None:
         self.fault = fault
         LOG.error("%s", fault)
-        try:
-            self._store.abandon()
-        except OSError:
-            LOG.debug("closing %s", self.name, exc_info=True)
+        with contextlib.suppress(OSError):
+            self._store.disk.close()
         while self._next(0.0) is not None:
             pass
 
 
-class _TlogFile:
-    """The file; used by the writer's thread only."""
-
-    def __init__(self, disk: Disk) -> None:
-        self._disk = disk
-
+class _TlogFile(Store[tuple[str, bytes, int]]):
     def keep(self, item: tuple[str, bytes, int]) -> None:
         direction, frame, unix_us = item
         link = 1 if direction == "out" else 0  # the two lowest bits of the time tell links apart
-        self._disk.write(struct.pack(">Q", (max(0, unix_us) & ~3) | link) + frame)
-
-    def flush(self) -> None:
-        self._disk.flush()
-        self._disk.sync()
-
-    def finish(self) -> None:
-        self.flush()
-        self._disk.close()
-
-    def abandon(self) -> None:
-        self._disk.close()
+        self.disk.write(struct.pack(">Q", (max(0, unix_us) & ~3) | link) + frame)
 
 
 class TlogWriter(AsyncWriter[tuple[str, bytes, int]]):
@@ -334,7 +319,7 @@ def check_disk(folder: Path, *, boats: int, minutes: float = 120.0, name: str = 
         minutes: how long must fit.
         name: of the check.
     """
-    needed = boats * minutes * 60.0 * BYTES_PER_BOAT_S
+    needed_mib = boats * minutes * 60.0 * BYTES_PER_BOAT_S / 2**20
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder) as file:  # the time that the disk takes to keep a second's worth of log
@@ -343,15 +328,13 @@ def check_disk(folder: Path, *, boats: int, minutes: float = 120.0, name: str = 
             file.flush()
             os.fsync(file.fileno())
             sync_s = time.monotonic() - started
-        free = float(shutil.disk_usage(folder).free)
+        free_mib = float(shutil.disk_usage(folder).free) / 2**20
     except OSError as error:
         return CheckResult(name, False, f"{folder}: {explain(error)}")
-    figures = {"free_mib": free / 2**20, "needed_mib": needed / 2**20, "sync_s": sync_s}
-    if free < needed:
-        text = f"{folder}: {free / 2**20:.0f} MiB free, {needed / 2**20:.0f} MiB needed for {minutes:g} min; free space"
-        return CheckResult(name, False, text, figures)
-    if sync_s > SLOWEST_SYNC_S:
+    figures = {"free_mib": free_mib, "needed_mib": needed_mib, "sync_s": sync_s}
+    text = f"{folder}: {free_mib:.0f} MiB free, {needed_mib:.0f} MiB needed for {minutes:g} min"
+    if free_mib < needed_mib:
+        text = f"{text}; free space"
+    elif sync_s > SLOWEST_SYNC_S:
         text = f"{folder}: the disk takes {sync_s:.1f} s to keep 64 KiB; set log_dir to a faster one"
-        return CheckResult(name, False, text, figures)
-    text = f"{folder}: {free / 2**20:.0f} MiB free, {needed / 2**20:.0f} MiB needed for {minutes:g} min"
-    return CheckResult(name, True, text, figures)
+    return CheckResult(name, free_mib >= needed_mib and sync_s <= SLOWEST_SYNC_S, text, figures)

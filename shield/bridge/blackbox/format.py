@@ -1,22 +1,15 @@
-"""A `Tick` as a record of the log and back, every float bit for bit.
-
-JSON has no word for numbers that are not finite. A field that is not finite is left out, so that viewers show a gap;
-in a list of numbers 0 stands in its place, and a list of nothing else is empty. ``odd`` of the tick says where each
-was and what it is, to the last bit.
-"""
+"""A `Tick` as a record of the log and back, every float bit for bit, and the JSON Schemas that the log carries."""
 
 from __future__ import annotations
 
+import dataclasses
 import json
-import math
-import struct
 from collections.abc import Mapping
-from dataclasses import asdict
-from typing import Any
+from typing import Any, get_args, get_origin, get_type_hints
 
 import msgspec
 import numpy as np
-from msgspec import UNSET
+from msgspec import UNSET, UnsetType
 
 from ...commands import Commands
 from ...decision import Decisions, Reason
@@ -26,109 +19,121 @@ from ...jit import Array
 from ...platforms import PLATFORMS, Gains, Platform
 from ...platforms import layout as L
 from ...surroundings import Surroundings
-from ..messages import BoatReading, Contact, Sent, Tick
-from .records import BoatRecord, ReadingRecord, SurroundingsRecord, TickRecord
+from ..messages import Action, BoatReading, Contact, Sent, Tick
+from .nonfinite import plain, put_back, restored, take_odd
 
-_PLAIN_NAN = struct.pack(">d", math.nan)
-_WORDS = {"nan": math.nan, "inf": math.inf, "-inf": -math.inf}
-
-
-def to_text(value: float) -> str:
-    """A float that is not finite as text: "inf", "-inf", "nan", and for a NaN with other bits "nan:" and 16 digits."""
-    if math.isinf(value):
-        return "inf" if value > 0.0 else "-inf"
-    packed = struct.pack(">d", value)
-    return "nan" if packed == _PLAIN_NAN else f"nan:{packed.hex()}"
+Number = float | UnsetType
+Schema = dict[str, Any]
 
 
-def from_text(text: Any) -> float:
-    """The float that `to_text` was given.
+class Record(msgspec.Struct, kw_only=True):
+    """An object of the log; its docstring describes it in the schema."""
 
-    Raises:
-        LogError: it is none.
+
+class CircleRecord(Record):
+    """A circle, m."""
+
+    x_m: float
+    y_m: float
+    radius_m: float
+
+
+class CornersRecord(Record):
+    """Corners of a polygon, m."""
+
+    x_m: list[float]
+    y_m: list[float]
+
+
+class SurroundingsRecord(Record):
+    """Static constraints given with this decision; field: xmin, ymin, xmax, ymax, m."""
+
+    field: list[float]
+    circles: list[CircleRecord]
+    keep_out: list[CircleRecord]
+    polygons: list[CornersRecord]
+    stops: list[CircleRecord] = []
+
+
+class BoatRecord(Record):
+    """One boat as the shield saw it, what was wanted of it and what was decided.
+
+    state: x m, y m, heading deg, speed m/s, thrust %, rudder %, speed error m/s and integral, heading error deg and
+    integral, turn rate deg/s. wanted, sent: speed m/s; heading rad from the y axis, or deg from the boat's own where
+    wanted_relative.
     """
-    if isinstance(text, str) and text in _WORDS:
-        return _WORDS[text]
-    try:
-        value = float(struct.unpack(">d", bytes.fromhex(str(text).removeprefix("nan:")))[0])
-    except (ValueError, struct.error):
-        value = 0.0
-    if not math.isnan(value):
-        raise LogError(f"the log holds {text!r} where a number belongs; it is damaged or of another version")
-    return value
+
+    name: str
+    platform: str
+    team: int
+    controlled: bool
+    state: list[float]
+    age_s: Number = UNSET
+    position_error_m: Number = UNSET
+    wanted: list[float] | UnsetType = UNSET
+    sent: list[float] | UnsetType = UNSET
+    intervened: bool | UnsetType = UNSET
+    reason: int | UnsetType = UNSET
+    why: str | UnsetType = UNSET
+    certificate_m: Number = UNSET
+    slack_m: Number = UNSET
+    bound: int | UnsetType = UNSET
+    cut_short: bool | UnsetType = UNSET
+    solver: int | UnsetType = UNSET
 
 
-def plain(value: Any) -> Any:
-    """Nested settings as JSON can hold them: tuples and arrays as lists, floats that are not finite as texts.
+class OddRecord(Record):
+    """A number that is not finite: its place, and nan, inf, -inf or nan:BITS."""
 
-    Raises:
-        TypeError: something else than texts, numbers, None, mappings and sequences.
-    """
-    if isinstance(value, (np.generic, np.ndarray)):
-        value = value.tolist()
-    if isinstance(value, float):
-        return value if math.isfinite(value) else to_text(value)
-    if value is None or isinstance(value, (bool, int, str)):
-        return value
-    if isinstance(value, dict):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(item) for item in value]
-    raise TypeError(f"a {type(value).__name__} has no place in a log")
+    at: str
+    value: str
 
 
-def restored(value: Any) -> Any:
-    """Settings that `plain` was given, lists staying lists; texts that mean a float become it."""
-    if isinstance(value, dict):
-        return {key: restored(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [restored(item) for item in value]
-    if isinstance(value, str) and (value in _WORDS or value.startswith("nan:")):
-        return from_text(value)
-    return value
+class TickRecord(Record):
+    """One turn of the loop. A number that is not finite is left out, 0 in a list, and listed in odd."""
+
+    number: int
+    due_s: float
+    began_s: float
+    sent_s: float
+    policy_age_s: float
+    shield_reset: bool
+    has_fleet: bool
+    has_wanted: bool
+    has_decisions: bool
+    wanted_relative: bool
+    sent_relative: bool
+    solve_time_s: float
+    boats: list[BoatRecord]
+    surroundings: list[SurroundingsRecord]
+    readings: list[BoatReading]
+    contacts: list[Contact]
+    sent: list[Sent]
+    actions: list[Action]
+    game: str
+    odd: list[OddRecord] = []
 
 
-def take_odd(node: Any, at: str = "") -> list[dict[str, str]]:
-    """Take numbers that are not finite out of a message, in place; where each was, dots between, and its text."""
-    found: list[dict[str, str]] = []
-    entries = list(node.items()) if isinstance(node, dict) else list(enumerate(node))
-    odd = [key for key, value in entries if type(value) is float and not math.isfinite(value)]
-    found += [{"at": f"{at}{key}", "value": to_text(node[key])} for key in odd]
-    for key in odd:
-        if isinstance(node, dict):
-            del node[key]
-        else:
-            node[key] = 0.0
-    if isinstance(node, list) and odd and len(odd) == len(node):
-        node.clear()
-    for key, value in entries:
-        if type(value) is dict or type(value) is list:
-            found += take_odd(value, f"{at}{key}.")
-    return found
-
-
-def put_back(message: Any, entries: Any) -> None:
-    """Put numbers that `take_odd` listed back where they were, in place.
-
-    Raises:
-        LogError: an entry is none, or its place is not there.
-    """
-    try:
-        for entry in entries:
-            *path, last = entry["at"].split(".")
-            node, value = message, from_text(str(entry["value"]))
-            for part in path:
-                node = node[int(part)] if isinstance(node, list) else node[part]
-            if isinstance(node, dict):
-                node[last] = value
-            elif int(last) == len(node):
-                node.append(value)
-            else:
-                node[int(last)] = value
-    except LogError:
-        raise
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError):
-        raise LogError("the log's list of odd numbers does not fit; it is damaged or of another version") from None
+COLUMNS: dict[str, tuple[type, str, type, tuple[int, ...]]] = {
+    "team": (Fleet, "team", np.int64, ()),
+    "controlled": (Fleet, "controlled", np.bool_, ()),
+    "state": (Fleet, "state", np.float64, (L.N_STATE,)),
+    "age_s": (Fleet, "age_s", np.float64, ()),
+    "position_error_m": (Fleet, "position_error_m", np.float64, ()),
+    "wanted": (Commands, "values", np.float64, (2,)),
+    "sent": (Commands, "values", np.float64, (2,)),
+    "intervened": (Decisions, "intervened", np.bool_, ()),
+    "reason": (Decisions, "reason", np.int64, ()),
+    "certificate_m": (Decisions, "safety_margin_m", np.float64, ()),  # the name that logs have had since 0.2.0
+    "slack_m": (Decisions, "slack_m", np.float64, ()),
+    "bound": (Decisions, "bound", np.int64, ()),
+    "cut_short": (Decisions, "cut_short", np.bool_, ()),
+    "solver": (Decisions, "solver", np.int64, ()),
+}
+"""Values of a `BoatRecord` that are a row of an array: whose, its name there, its kind and shape."""
+_LATER = {"released", "released_by", "failsafe_over"}
+"""Parts of a reading that 0.8.0 did not know."""
+_READING = {entry.name for entry in dataclasses.fields(BoatReading)} - _LATER
 
 
 def tick_to_json(tick: Tick, platforms: Mapping[str, Platform]) -> dict[str, Any]:
@@ -154,7 +159,7 @@ def tick_to_json(tick: Tick, platforms: Mapping[str, Platform]) -> dict[str, Any
         "solve_time_s": 0.0 if decisions is None else float(decisions.solve_time_s),
         "boats": [] if fleet is None else _boats(fleet, tick.wanted, decisions, platforms),
         "surroundings": [] if tick.surroundings is None else [_surroundings(tick.surroundings)],
-        "readings": [_reading(reading) for reading in tick.readings.values()],
+        "readings": [_floats(reading) for reading in tick.readings.values()],
         "contacts": [_floats(contact) for contact in tick.contacts],
         "sent": [_floats(sent) for sent in tick.sent.values()],
         "actions": [dict(vars(action)) for action in tick.actions],
@@ -170,22 +175,15 @@ def _boats(
     columns: dict[str, Any] = {
         "name": fleet.names,
         "platform": [_platform_text(kind, platforms) for kind in fleet.platforms],
-        "team": fleet.team.tolist(),
-        "controlled": fleet.controlled.tolist(),
-        "state": fleet.state.tolist(),
     }
-    for name in ("age_s", "position_error_m"):
-        if getattr(fleet, name) is not None:
-            columns[name] = getattr(fleet, name).tolist()
-    if wanted is not None:
-        columns["wanted"] = wanted.values.tolist()
     if decisions is not None:
-        columns["sent"] = decisions.filtered.values.tolist()
         columns["why"] = [Reason(int(reason)).name for reason in decisions.reason]
-        columns["certificate_m"] = decisions.safety_margin_m.tolist()  # the name that logs have had since 0.2.0
-        for name in ("intervened", "reason", "slack_m", "bound", "cut_short", "solver"):
-            if getattr(decisions, name) is not None:
-                columns[name] = getattr(decisions, name).tolist()
+    sent = None if decisions is None else decisions.filtered
+    for name, (kind, attribute, _, _) in COLUMNS.items():
+        owner = {Fleet: fleet, Decisions: decisions, Commands: wanted if name == "wanted" else sent}[kind]
+        values = getattr(owner, attribute, None)
+        if values is not None:
+            columns[name] = values.tolist()
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
@@ -194,7 +192,7 @@ def _platform_text(kind: str | Platform, known: Mapping[str, Platform]) -> str:
     platform = kind if isinstance(kind, Platform) else PLATFORMS.get(kind)
     if platform is None or known.get(platform.name) == platform:
         return kind if isinstance(kind, str) else kind.name
-    return json.dumps(plain(asdict(platform)), allow_nan=False)
+    return json.dumps(plain(dataclasses.asdict(platform)), allow_nan=False)
 
 
 def _surroundings(fixed: Surroundings) -> dict[str, Any]:
@@ -210,12 +208,10 @@ def _floats(entry: Contact | Sent | BoatReading) -> dict[str, Any]:
     row: dict[str, Any] = {n: float(value) if isinstance(value, float) else value for n, value in vars(entry).items()}
     if "position_m" in row:
         row["position_m"] = [float(value) for value in row["position_m"]]
+    if "faults" in row:
+        row["faults"] = [{"kind": kind, "count": count} for kind, count in row["faults"].items()]
+        row["texts"] = list(row["texts"])
     return row
-
-
-def _reading(reading: BoatReading) -> dict[str, Any]:
-    faults = [{"kind": kind, "count": count} for kind, count in reading.faults.items()]
-    return {**_floats(reading), "faults": faults, "texts": list(reading.texts)}
 
 
 def _any(value: Any) -> Any:
@@ -235,7 +231,12 @@ def tick_from_json(message: Any, platforms: Mapping[str, Platform]) -> Tick:
     """
     try:
         put_back(message, message.get("odd", ()))
-        return _tick(msgspec.convert(message, TickRecord), platforms)
+        readings = []
+        for row in message["readings"]:
+            if not row.keys() >= _READING:
+                raise KeyError("a reading without all its parts")
+            readings.append({**row, "faults": {entry["kind"]: entry["count"] for entry in row["faults"]}})
+        return _tick(msgspec.convert({**message, "readings": readings}, TickRecord), platforms)
     except LogError:
         raise
     except (msgspec.ValidationError, KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
@@ -247,65 +248,54 @@ def tick_from_json(message: Any, platforms: Mapping[str, Platform]) -> Tick:
 
 
 def _tick(record: TickRecord, platforms: Mapping[str, Platform]) -> Tick:
-    rows, fleet, decisions = record.boats, None, None
+    rows, fleet, decisions, wanted = record.boats, None, None, None
     around = _surroundings_of(record.surroundings[0]) if record.surroundings else None
     if record.has_fleet:
-        fleet = Fleet(
-            state=_table(rows, "state", L.N_STATE),
-            team=np.array([row.team for row in rows], dtype=np.int64),
-            platforms=tuple(_platform(row.platform, platforms) for row in rows),
-            controlled=np.array([row.controlled for row in rows], dtype=np.bool_),
-            names=tuple(row.name for row in rows),
-            age_s=_column(rows, "age_s", np.float64),
-            position_error_m=_column(rows, "position_error_m", np.float64),
-        )
-    wanted = Commands(_table(rows, "wanted", 2), record.wanted_relative) if record.has_wanted else None
+        names, kinds = tuple(row.name for row in rows), tuple(_platform(row.platform, platforms) for row in rows)
+        fleet = Fleet(names=names, platforms=kinds, **_arrays(rows, Fleet))
+    if record.has_wanted:
+        wanted = Commands(_array(rows, "wanted"), record.wanted_relative)
     if record.has_decisions and fleet is not None and wanted is not None:
-        floats = [_column(rows, name, np.float64) for name in ("certificate_m", "slack_m")]
-        whole = [_column(rows, name, np.int64) for name in ("reason", "bound")]
-        if any(column is None for column in (*floats, *whole)) and rows:
-            raise LogError("a decision lacks a value; it is damaged or of another version")
-        safety_margin_m, slack_m, reason, bound = (np.array([]) if c is None else c for c in (*floats, *whole))
-        if not set(reason.tolist()) <= {int(known) for known in Reason}:
-            raise LogError("a decision has a reason that is none; it is damaged or of another version")
         decisions = Decisions(
             fleet=fleet,
             nominal=wanted,
-            filtered=Commands(_table(rows, "sent", 2), record.sent_relative),
-            intervened=np.array([row.intervened is True for row in rows], dtype=np.bool_),
-            reason=reason,
-            safety_margin_m=safety_margin_m,
-            slack_m=slack_m,
-            bound=bound,
-            cut_short=_column(rows, "cut_short", np.bool_),
-            solver=_column(rows, "solver", np.int64),
+            filtered=Commands(_array(rows, "sent"), record.sent_relative),
             solve_time_s=record.solve_time_s,
             area=None if around is None else around.field,
+            **_arrays(rows, Decisions),
         )
+        for reason in decisions.reason:
+            Reason(int(reason))
+    same = ("number", "due_s", "began_s", "sent_s", "shield_reset", "policy_age_s")
     return Tick(
-        number=record.number,
-        due_s=record.due_s,
-        began_s=record.began_s,
-        sent_s=record.sent_s,
-        readings={row.boat: _reading_of(row) for row in record.readings},
+        **{name: getattr(record, name) for name in same},
+        readings={row.boat: dataclasses.replace(row) for row in record.readings},  # with what an old log lacks
         contacts=tuple(record.contacts),
         fleet=fleet,
         wanted=wanted,
         surroundings=around,
         decisions=decisions,
-        shield_reset=record.shield_reset,
-        sent={row.boat: row for row in record.sent},
-        policy_age_s=record.policy_age_s,
+        sent={row.boat: dataclasses.replace(row) for row in record.sent},
         actions=tuple(record.actions),
         game=json.loads(record.game) if record.game else {},
     )
 
 
-def _reading_of(record: ReadingRecord) -> BoatReading:
-    values = msgspec.structs.asdict(record)
-    x_m, y_m = record.position_m
-    faults = {entry.kind: entry.count for entry in record.faults}
-    return BoatReading(**{**values, "position_m": (x_m, y_m), "faults": faults, "texts": tuple(record.texts)})
+def _arrays(rows: list[BoatRecord], owner: type) -> dict[str, Array]:
+    """Arrays of a `Fleet` or of `Decisions`, as far as the log has them."""
+    return {
+        attribute: _array(rows, name)
+        for name, (whose, attribute, _, _) in COLUMNS.items()
+        if whose is owner and not (rows and getattr(rows[0], name) is UNSET)
+    }
+
+
+def _array(rows: list[BoatRecord], name: str) -> Array:
+    _, _, kind, shape = COLUMNS[name]
+    values = [getattr(row, name) for row in rows]
+    if UNSET in values or any(shape and len(value) != shape[0] for value in values):
+        raise LogError(f"a boat lacks its {name}, or some of its numbers; the log is damaged or of another version")
+    return np.array(values, dtype=kind).reshape(len(rows), *shape)
 
 
 def _platform(text: str, known: Mapping[str, Platform]) -> str | Platform:
@@ -334,21 +324,6 @@ def platform_from(row: Mapping[str, Any]) -> Platform:
         raise LogError(f"the log holds a platform that does not fit this version ({error})") from None
 
 
-def _table(rows: list[BoatRecord], name: str, width: int) -> Array:
-    values = [getattr(row, name) for row in rows]
-    if any(len(value) != width for value in values):
-        raise LogError(f"{name} of a boat has not {width} numbers; the log is damaged or of another version")
-    return np.array(values, dtype=np.float64).reshape(len(rows), width)
-
-
-def _column(rows: list[BoatRecord], name: str, kind: Any) -> Any:
-    """A value of all boats; None where the log has none."""
-    values = [getattr(row, name) for row in rows]
-    if not values or values[0] is UNSET:
-        return None
-    return np.array(values, dtype=kind)
-
-
 def _surroundings_of(row: SurroundingsRecord) -> Surroundings:
     circles = {
         name: [(entry.x_m, entry.y_m, entry.radius_m) for entry in getattr(row, name)]
@@ -356,3 +331,35 @@ def _surroundings_of(row: SurroundingsRecord) -> Surroundings:
     }
     polygons = [list(zip(line.x_m, line.y_m, strict=True)) for line in row.polygons]
     return Surroundings(field=tuple(row.field) or None, polygons=polygons, **circles)  # type: ignore[arg-type]
+
+
+_PLAIN = {float: "number", int: "integer", str: "string", bool: "boolean"}
+
+
+def schema_of(kind: type[Any], title: str = "") -> Schema:
+    """JSON Schema of a record, or of a message kept as it is, in the forms that log viewers understand."""
+
+    def of(hint: Any) -> Schema:
+        if hint in _PLAIN:
+            return {"type": _PLAIN[hint]}
+        if get_origin(hint) in (list, tuple):
+            return {"type": "array", "items": of(get_args(hint)[0])}
+        if get_origin(hint) is dict:  # as a list of its entries
+            return {"type": "array", "items": object_schema("", "Refused since the last reading", kind=str, count=int)}
+        if isinstance(hint, type) and (issubclass(hint, Record) or dataclasses.is_dataclass(hint)):
+            return schema_of(hint)
+        return of(next(entry for entry in get_args(hint) if entry is not UnsetType))
+
+    description = " ".join((kind.__doc__ or "").partition("Attributes:")[0].split())
+    found = object_schema(title, description)
+    return {**found, "properties": {name: of(hint) for name, hint in get_type_hints(kind).items()}}
+
+
+def object_schema(title: str, description: str, **properties: type) -> Schema:
+    """JSON Schema of an object with such plain properties."""
+    head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title} if title else {}
+    parts = {name: {"type": _PLAIN[kind]} for name, kind in properties.items()}
+    return {**head, "type": "object", "description": description, "properties": parts}
+
+
+TICK = schema_of(TickRecord, "steerclear.Tick")

@@ -24,7 +24,7 @@ ENDS = "log"
 MOST, MOST_BREAKS = 1 << 62, 20
 """No log has so many records; breaks kept in words, further ones are counted."""
 _KEY_USE = b"steerclear black box"
-_DIGITS = 2 * hashlib.sha256().digest_size
+_BYTES = hashlib.sha256().digest_size
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class ChainHead:
     @classmethod
     def new(cls) -> Self:
         """The beginning of a new log."""
-        return cls(os.urandom(_DIGITS // 2).hex())
+        return cls(os.urandom(_BYTES).hex())
 
     @classmethod
     def from_text(cls, text: str) -> Self:
@@ -55,7 +55,7 @@ class ChainHead:
         """
         try:
             found = cls(**json.loads(text))
-            sound = len(bytes.fromhex(found.head)) == _DIGITS // 2 and 0 <= int(found.count) < MOST
+            sound = len(bytes.fromhex(found.head)) == _BYTES and 0 <= int(found.count) < MOST
         except (TypeError, ValueError, RecursionError):
             sound = False
         if not sound:
@@ -65,7 +65,7 @@ class ChainHead:
 
 @dataclass(frozen=True)
 class Link:
-    """One link.
+    """A link of the log's chain: the digest of the records since the last link, and of that.
 
     Attributes:
         count: records up to here, links left out.
@@ -114,13 +114,7 @@ class Chain:
         self._digests = hashlib.sha256(bytes.fromhex(head.head))
 
     def add(self, topic: str, times: tuple[int, int, int], data: bytes) -> None:
-        """Digest a record.
-
-        Args:
-            topic: its topic.
-            times: when it was logged and published, ns, and its number within its topic.
-            data: its content.
-        """
+        """Digest a record: its topic; when it was logged and published, ns, and its number there; its content."""
         name = topic.encode()
         self._digests.update(struct.pack(">QQIIQ", *times, len(name), len(data)) + name)
         self._digests.update(data)
@@ -153,17 +147,19 @@ class ChainCheck:
         breaks: what does not fit, in words, `MOST_BREAKS` at most.
         broken: how many things do not fit.
         is_mended: the file says that `reader.mend` wrote it from one that was cut off.
-        end: what the last link said of the end of its file; "" while it did not.
     """
 
     def __init__(self, key: bytes | None = None) -> None:
-        self.chained = self.keyed = self.is_mended = False
+        self.keyed = self.is_mended = False
         self.codes_checked = self.broken = 0
         self.breaks: list[str] = []
-        self.end = ""
-        self._key = key
+        self._key, self._end, self._early = key, "", 0
         self._chain: Chain | None = None
-        self._early = 0
+
+    @property
+    def chained(self) -> bool:
+        """Whether there is a chain at all."""
+        return self._chain is not None
 
     @property
     def holds(self) -> bool:
@@ -173,64 +169,60 @@ class ChainCheck:
     def begin(self, head: ChainHead) -> None:
         """The header of the file was met, with this head in it."""
         if self._key is not None and not head.keyed:
-            self.tell("it carries no codes, though a key was given: it was written without the key")
+            self._tell("it carries no codes, though a key was given: it was written without the key")
         if self._early:
-            self.tell(f"{self._early} records stand before the header")
+            self._tell(f"{self._early} records stand before the header")
         if head.count:
-            self.tell(f"the {head.count} records before its first are missing")
-        self.chained, self.keyed, self._chain = True, head.keyed, Chain(head, self._key)
+            self._tell(f"the {head.count} records before its first are missing")
+        self.keyed, self._chain = head.keyed, Chain(head, self._key)
 
     def add(self, topic: str, times: tuple[int, int, int], data: bytes) -> None:
         """A record was met; see `Chain.add`."""
         if self._chain is None:
             self._early += 1
             return
-        if (self.end or self.is_mended) and self._chain.loose == 0:
-            self.tell("records follow after the end of the file")
+        if self._chain.loose == 0:
+            self._look_for_end()
         self._chain.add(topic, times, data)
 
     def link(self, content: Mapping[str, Any]) -> None:
         """A link was met."""
-        chain = self._chain
-        if chain is None:
+        if self._chain is None:
             self._early += 1
             return
         try:
             found = Link.of(content)
         except LogError as error:
-            self.tell(str(error))
+            self._tell(str(error))
             return
-        if self.end or self.is_mended:
-            self.tell("records follow after the end of the file")
+        self._look_for_end()
+        self._compare(found, self._chain)
+        self._chain.go_on(found)
+        self._end = found.end
+
+    def close(self, is_closed: bool) -> None:
+        """The file's records are at their end; if it was not completed, its writer was killed, or its end cut off."""
+        if self.chained and is_closed and not self._end and not self.is_mended:
+            self._tell("its end was cut off and the file closed again")
+
+    def _look_for_end(self) -> None:
+        if self._end or self.is_mended:
+            self._tell("records follow after the end of the file")
+
+    def _compare(self, found: Link, chain: Chain) -> None:
         ours, missing = chain.next_link(found.end), found.count - chain.count
         if missing:
             what = f"{missing} records are missing" if missing > 0 else f"{-missing} records are too many"
-            self.tell(f"{what} before record {found.count}")
+            self._tell(f"{what} before record {found.count}")
         elif found.digest != ours.digest:
-            self.tell(f"of records {chain.count - chain.loose + 1} to {chain.count} some are not as they were written")
+            self._tell(f"of records {chain.count - chain.loose + 1} to {chain.count} some are not as they were written")
         elif self._key is not None and self.keyed:
             if hmac.compare_digest(found.code, ours.code):
                 self.codes_checked += 1
             else:
-                self.tell(f"the code of the link after record {found.count} is not of this key")
-        chain.go_on(found)
-        self.end = found.end
+                self._tell(f"the code of the link after record {found.count} is not of this key")
 
-    def mend(self) -> None:
-        """The mark of a mended file was met."""
-        self.is_mended = True
-
-    def close(self, is_closed: bool) -> None:
-        """The file's records are at their end.
-
-        Args:
-            is_closed: whether the file was completed; if not, its writer was killed, or its end was cut off.
-        """
-        if self._chain is not None and is_closed and not self.end and not self.is_mended:
-            self.tell("its end was cut off and the file closed again")
-
-    def tell(self, text: str) -> None:
-        """Something does not fit."""
+    def _tell(self, text: str) -> None:
         self.broken += 1
         if len(self.breaks) < MOST_BREAKS:
             self.breaks.append(text)

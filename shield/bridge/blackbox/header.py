@@ -6,7 +6,7 @@ import hashlib
 import json
 import platform as machine
 import time
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -22,8 +22,9 @@ from ...tables.files import find_table
 from ...tables.settings import OtherMay
 from ..fleet_file import FleetFile
 from ..frame import FieldFrame
-from .format import plain, platform_from, restored
+from .format import object_schema, platform_from
 from .hash_chain import ChainHead
+from .nonfinite import plain, restored
 
 LOG_VERSION = 2
 """Logs of version 1 (0.6 and before) are read by the program that wrote them."""
@@ -56,18 +57,14 @@ def source_digest() -> str:
 
 
 def table_digests(platforms: Iterable[str]) -> dict[str, str]:
-    """Digests of the value table files there are for pairs of platforms, which the shield may look opponents up in.
-
-    Args:
-        platforms: names.
-    """
-    found, names = {}, sorted(platforms)
-    for own in names:
-        for other in names:
-            path = find_table(own, other, OtherMay.WORST_CASE)
-            if path is not None:
-                found[f"{own} with {other}"] = hashlib.sha256(path.read_bytes()).hexdigest()
-    return found
+    """Digests of the value table files for pairs of platforms, by name, which the shield may look opponents up in."""
+    names = sorted(platforms)
+    paths = {(own, other): find_table(own, other, OtherMay.WORST_CASE) for own in names for other in names}
+    return {
+        f"{own} with {other}": hashlib.sha256(path.read_bytes()).hexdigest()
+        for (own, other), path in paths.items()
+        if path is not None
+    }
 
 
 @cache
@@ -155,29 +152,7 @@ class LogHeader:
 
     def to_message(self) -> dict[str, Any]:
         """The message; what has no fixed form is JSON in a text, so that log viewers can show it."""
-        shown = {
-            "version": self.version,
-            "fleet_yaml": self.fleet_text,
-            "preset": self.preset,
-            "policy": self.policy,
-            "clock_s": plain(self.clock_s),
-            "unix_ns": str(self.unix_ns),
-            "sources": self.sources,
-            "machine": self.machine,
-        }
-        hidden = {
-            "shield": asdict(self.config),
-            "surroundings": asdict(self.surroundings),
-            "platforms": {name: asdict(kind) for name, kind in self.platforms.items()},
-            "boats": [asdict(boat) for boat in self.boats],
-            "frame": None if self.frame is None else asdict(self.frame),
-            "field_size_m": self.field_size_m,
-            "notes": dict(self.notes),
-            "versions": dict(self.versions),
-            "tables": dict(self.tables or {}),
-            "chain": asdict(self.chain),
-        }
-        return shown | {name: json.dumps(plain(value), allow_nan=False) for name, value in hidden.items()}
+        return {key: part.write(getattr(self, name)) for name, (key, part) in PARTS.items()}
 
     @classmethod
     def from_message(cls, message: Mapping[str, Any]) -> LogHeader:
@@ -193,7 +168,7 @@ class LogHeader:
                 f"steerclear {_writer(message)}"
             )
         try:
-            return cls(**_parts(message))
+            return cls(**{name: part.read(message[key]) for name, (key, part) in PARTS.items()})
         except SteerclearError as error:
             raise LogError(
                 f"the log's header does not fit this version ({error}); it was written by {_writer(message)}"
@@ -209,16 +184,11 @@ def _writer(message: Mapping[str, Any]) -> str:
         return "an unknown version"
 
 
-def _finite(value: Any) -> float:
+def _time_s(value: Any) -> float:
     number = float(restored(value))
     if not abs(number) < LATEST_S:
         raise ValueError(f"{number} is no time")
     return number
-
-
-def _texts(text: str) -> dict[str, str]:
-    """Names with texts, from JSON."""
-    return {str(name): str(value) for name, value in dict(json.loads(text)).items()}
 
 
 def _boat(row: Mapping[str, Any]) -> LoggedBoat:
@@ -228,30 +198,60 @@ def _boat(row: Mapping[str, Any]) -> LoggedBoat:
     return replace(boat, team=int(boat.team), ours=bool(boat.ours))
 
 
-def _parts(message: Mapping[str, Any]) -> dict[str, Any]:
-    """Arguments of `LogHeader` from its message."""
-    size = json.loads(message["field_size_m"])
-    frame = json.loads(message["frame"])
-    return {
-        "config": ShieldConfig.of(**current_settings(restored(json.loads(message["shield"])))),
-        "surroundings": Surroundings(**restored(json.loads(message["surroundings"]))),
-        "platforms": {name: platform_from(row) for name, row in json.loads(message["platforms"]).items()},
-        "boats": tuple(_boat(row) for row in json.loads(message["boats"])),
-        "frame": None if frame is None else FieldFrame(**frame),
-        "field_size_m": None if size is None else (float(size[0]), float(size[1])),
-        "fleet_text": str(message["fleet_yaml"]),
-        "preset": str(message["preset"]),
-        "policy": str(message["policy"]),
-        "notes": _texts(message["notes"]),
-        "clock_s": _finite(message["clock_s"]),
-        "unix_ns": int(message["unix_ns"]),
-        "versions": _texts(message["versions"]),
-        "tables": _texts(message["tables"]),
-        "sources": str(message["sources"]),
-        "machine": str(message["machine"]),
-        "version": message["version"],
-        "chain": ChainHead.from_text(str(message["chain"])),
-    }
+@dataclass(frozen=True)
+class Part:
+    """How a part of the header is written into its message and read from it."""
+
+    write: Callable[[Any], Any]
+    read: Callable[[Any], Any]
+
+
+def _hidden(write: Callable[[Any], Any], read: Callable[[Any], Any]) -> Part:
+    """A part that is JSON in a text."""
+    return Part(lambda value: json.dumps(plain(write(value)), allow_nan=False), lambda text: read(json.loads(text)))
+
+
+def _optional(write: Callable[[Any], Any], read: Callable[[Any], Any]) -> Part:
+    return _hidden(
+        lambda value: None if value is None else write(value), lambda found: None if found is None else read(found)
+    )
+
+
+_TEXT = Part(str, str)
+_TEXTS = _hidden(dict, lambda found: {str(name): str(value) for name, value in dict(found).items()})
+PARTS: dict[str, tuple[str, Part]] = {
+    "version": ("version", Part(int, int)),
+    "fleet_text": ("fleet_yaml", _TEXT),
+    "preset": ("preset", _TEXT),
+    "policy": ("policy", _TEXT),
+    "clock_s": ("clock_s", Part(plain, _time_s)),
+    "unix_ns": ("unix_ns", Part(str, int)),
+    "sources": ("sources", _TEXT),
+    "machine": ("machine", _TEXT),
+    "config": ("shield", _hidden(asdict, lambda found: ShieldConfig.of(**current_settings(restored(found))))),
+    "surroundings": ("surroundings", _hidden(asdict, lambda found: Surroundings(**restored(found)))),
+    "platforms": (
+        "platforms",
+        _hidden(
+            lambda kinds: {name: asdict(kind) for name, kind in kinds.items()},
+            lambda found: {name: platform_from(row) for name, row in found.items()},
+        ),
+    ),
+    "boats": ("boats", _hidden(lambda boats: list(map(asdict, boats)), lambda found: tuple(map(_boat, found)))),
+    "frame": ("frame", _optional(asdict, lambda found: FieldFrame(**found))),
+    "field_size_m": ("field_size_m", _optional(list, lambda found: (float(found[0]), float(found[1])))),
+    "notes": ("notes", _TEXTS),
+    "versions": ("versions", _TEXTS),
+    "tables": ("tables", _TEXTS),
+    "chain": ("chain", Part(lambda head: json.dumps(asdict(head)), lambda text: ChainHead.from_text(str(text)))),
+}
+"""Parts of a header: their names in the message, and how they are written and read."""
+HEADER = object_schema(
+    "steerclear.Header",
+    "What the shield was built with; the first message. Texts that begin with a bracket are JSON.",
+    **{key: {"version": int, "clock_s": float}.get(key, str) for key, _ in PARTS.values()},
+)
+"""JSON Schema of the message."""
 
 
 def platforms_of(kinds: Iterable[str | Platform]) -> dict[str, Platform]:
@@ -282,26 +282,19 @@ def header_of_fleet(
         clock_s: time on the loop's clock now, s.
         notes: anything else worth keeping.
     """
-    boats = tuple(
-        LoggedBoat(
-            name=boat.name,
-            agent=boat.agent or "",
-            team=fleet.team_of[boat.name],
-            platform=fleet.platform_of[boat.name].name,
-            ours=boat.name in commanded,
-        )
-        for boat in fleet.boats
+    rows = (
+        (boat.name, boat.agent or "", fleet.team_of[boat.name], fleet.platform_of[boat.name]) for boat in fleet.boats
     )
     return LogHeader(
         config=fleet.shield_config,
         surroundings=fleet.surroundings,
         platforms={kind.name: kind for kind in fleet.platform_of.values()},
-        boats=boats,
+        boats=tuple(LoggedBoat(name, agent, team, kind.name, name in commanded) for name, agent, team, kind in rows),
         frame=fleet.frame,
         field_size_m=fleet.field.size_m,
         fleet_text=text,
         preset=fleet.preset,
         policy=policy,
-        notes={} if notes is None else notes,
+        notes=notes or {},
         clock_s=clock_s,
     )

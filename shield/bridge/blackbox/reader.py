@@ -10,7 +10,6 @@ import struct
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import IO, Any
 
 from mcap.exceptions import EndOfFile, McapError
@@ -23,11 +22,11 @@ from ...compat import Self
 from ...exceptions import LogError
 from ..messages import Tick
 from .disk import Disk
+from .format import Schema as JsonSchema
 from .format import tick_from_json
 from .hash_chain import ChainCheck
 from .header import LogHeader
 from .recorder import HEADER_TOPIC, LINK_TOPIC, LOG_TOPIC, MENDED_TOPIC, TICK_TOPIC
-from .records import MENDED
 
 LOG = logging.getLogger(__name__)
 
@@ -37,19 +36,20 @@ _DAMAGE = (McapError, CRCValidationError, ZstdError, struct.error, UnicodeDecode
 _PART = re.compile(r"(?P<first>.+)\.part[1-9]\d*(?P<ending>\.[^.]*)")
 PARTS = "is in parts, as 0.8.0 wrote runs of more than 20 minutes; replay it with steerclear 0.8.0"
 
+MENDED: JsonSchema = {
+    "$schema": "https://json-schema.org/draft/2020-12/schema",
+    "title": "steerclear.Mended",
+    "type": "object",
+    "description": "The file was written from one that was cut off.",
+    "properties": {"damage": {"type": "array", "items": {"type": "string"}}},
+}
+
 Tell = Callable[[str], None]
 
 
 @dataclass(frozen=True)
 class LogLine:
-    """A line of text in a log.
-
-    Attributes:
-        time_ns: when, ns since 1970.
-        level: 1 debug, 2 info, 3 warning, 4 error.
-        name: who it is about.
-        text: the line.
-    """
+    """A line of text: when, ns since 1970; 1 debug, 2 info, 3 warning or 4 error; whom it is about; its words."""
 
     time_ns: int
     level: int
@@ -128,9 +128,7 @@ class LogReader:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _find_header(self) -> LogHeader:
@@ -160,7 +158,7 @@ class LogReader:
                 except LogError:
                     self.chain.link({})
             elif topic == MENDED_TOPIC:
-                self.chain.mend()
+                self.chain.is_mended = True
             else:
                 self.chain.add(topic, (item.log_time, item.publish_time, item.sequence), item.data)
                 yield topic, item

@@ -17,22 +17,26 @@ from mcap.writer import CompressionType, Writer
 from ...exceptions import BridgeError
 from ..messages import Action, Tick
 from . import foxglove as fg
-from .disk import AsyncWriter, Disk, explain
-from .format import plain, tick_to_json
+from .disk import AsyncWriter, Disk, Store, explain
+from .format import TICK, Schema, schema_of, tick_to_json
 from .hash_chain import ENDS, Chain, Link
-from .header import LogHeader
-from .records import HEADER, LINK, TICK, Schema
+from .header import HEADER, LogHeader
+from .nonfinite import plain
 
 LOG = logging.getLogger(__name__)
 
 TICK_TOPIC, HEADER_TOPIC, LOG_TOPIC, LINK_TOPIC, MENDED_TOPIC = "/tick", "/header", "/log", "/link", "/mended"
 SCENE_TOPIC, FIELD_TOPIC, FIX_TOPIC = "/scene", "/field", "/fix/"
-SCENE_EVERY_S, FIX_EVERY_S, FIELD_EVERY_S = 0.2, 1.0, 10.0
+EVERY_S = {SCENE_TOPIC: 0.2, FIX_TOPIC: 1.0, FIELD_TOPIC: 10.0}
+LINK = schema_of(Link, "steerclear.Link")
 CHUNK_BYTES = 1 << 20
 """A chunk is closed at every flush; this only bounds one."""
 
+Line = tuple[int, str, str]
+"""A line of the log: its level, who it is about, its text."""
 
-class McapFile:
+
+class McapFile(Store[Tick | Line]):
     """Writes a log; used by one thread.
 
     Args:
@@ -45,7 +49,8 @@ class McapFile:
     """
 
     def __init__(self, disk: Disk, header: LogHeader, key: bytes | None = None) -> None:
-        self._disk, self._header = disk, header
+        super().__init__(disk)
+        self._header = header
         self._chain = Chain(header.chain, key)
         self._writer = Writer(disk, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)  # type: ignore[arg-type]
         self._writer.start(profile="", library="steerclear")
@@ -53,131 +58,111 @@ class McapFile:
         self._channels: dict[str, int] = {}
         self._counts: dict[str, int] = {}
         self._last_ns = header.unix_ns
-        self._due_s = {SCENE_TOPIC: -1e18, FIX_TOPIC: -1e18, FIELD_TOPIC: -1e18}
-        self._undrawn = False
-        self._told = 0
+        self._due_s = dict.fromkeys(EVERY_S, -1e18)
+        self._undrawn, self._dropped = False, 0
         self.dropped: Callable[[], int] = lambda: 0
         self._active: dict[tuple[str, str, str], Action] = {}
         self._add(HEADER_TOPIC, HEADER, header.to_message(), header.unix_ns)
         self.flush()
 
-    def keep(self, item: Tick | tuple[int, str, str]) -> None:
+    def keep(self, item: Tick | Line) -> None:
         """Write a tick, and what shows it in a viewer, or a line of the log."""
         if not isinstance(item, Tick):
-            self.add_line(*item)
+            self._add_line(*item)
             return
-        tick = item
-        time_ns = self._header.time_ns(tick.began_s)
-        self._add(TICK_TOPIC, TICK, tick_to_json(tick, self._header.platforms), time_ns)
-        self._add_lines(tick, time_ns)
+        time_ns = self._header.time_ns(item.began_s)
+        self._add(TICK_TOPIC, TICK, tick_to_json(item, self._header.platforms), time_ns)
+        self._add_lines(item, time_ns)
         try:
-            self._draw(tick, time_ns)
+            self._draw(item, time_ns)
         except Exception as error:  # a picture is no reason to lose the record
-            self._tell_undrawn(error)
-        self._link(self._chain.next_link())
-
-    def add_line(self, level: int, name: str, text: str, time_ns: int | None = None) -> None:
-        """Write a line of the log, at the time of the last message when none is given."""
-        at_ns = self._last_ns if time_ns is None else time_ns
-        self._add(LOG_TOPIC, fg.LOG, fg.log_message(at_ns, level, name, text), at_ns)
+            if not self._undrawn:  # said once, since it may happen at every tick
+                LOG.warning("drawing in the log failed", exc_info=error)
+                text = f"drawing failed ({type(error).__name__}: {error}); the ticks are whole"
+                self._add_line(fg.WARNING, "black box", text)
+            self._undrawn = True
+        self._link()
 
     def flush(self) -> None:
         """Bring everything to the disk, up to a link."""
         self._tell_dropped()
         if self._chain.loose:
-            self._link(self._chain.next_link())
+            self._link()
         self._writer.flush()
-        self._disk.sync()
+        super().flush()
 
     def finish(self) -> None:
         """Write the closing link and the index, close the file."""
         self._tell_dropped()
-        self._link(self._chain.next_link(ENDS))
+        self._link(ENDS)
         self._writer.finish()
-        self._disk.flush()
-        self._disk.sync()
-        self._disk.close()
-
-    def abandon(self) -> None:
-        """Close the file as it is."""
-        self._disk.close()
+        super().finish()
 
     def _tell_dropped(self) -> None:
-        dropped = self.dropped()
-        if dropped > self._told:
-            text = f"the disk is too slow: {dropped - self._told} ticks before this are missing, {dropped} in all"
-            self.add_line(fg.ERROR, "black box", text)
-            self._told = dropped
+        dropped, before = self.dropped(), self._dropped
+        if dropped > before:
+            text = f"the disk is too slow: {dropped - before} ticks before this are missing, {dropped} in all"
+            self._add_line(fg.ERROR, "black box", text)
+            self._dropped = dropped
 
     def _add_lines(self, tick: Tick, time_ns: int) -> None:
         """Actions that begin and end, what autopilots said, what links refused."""
         now = {(action.subject, action.condition, action.response): action for action in tick.actions}
-        for key, action in now.items():
-            if key not in self._active:
-                self.add_line(fg.WARNING, action.subject, f"{action.condition}: {action.text}", time_ns)
-        for key, action in self._active.items():
-            if key not in now:
-                self.add_line(fg.INFO, action.subject, f"{action.condition}: {action.response} is over", time_ns)
+        begun = [action for key, action in now.items() if key not in self._active]
+        over = [action for key, action in self._active.items() if key not in now]
         self._active = now
+        lines = [(fg.WARNING, action.subject, f"{action.condition}: {action.text}") for action in begun]
+        lines += [(fg.INFO, action.subject, f"{action.condition}: {action.response} is over") for action in over]
         for reading in tick.readings.values():
-            for text in reading.texts:
-                self.add_line(fg.INFO, reading.boat, text, time_ns)
-            for kind, count in reading.faults.items():
-                self.add_line(fg.WARNING, reading.boat, f"refused: {kind} ({count})", time_ns)
+            lines += [(fg.INFO, reading.boat, text) for text in reading.texts]
+            lines += [(fg.WARNING, reading.boat, f"refused: {kind} ({n})") for kind, n in reading.faults.items()]
+        for line in lines:
+            self._add_line(*line, time_ns)
 
     def _draw(self, tick: Tick, time_ns: int) -> None:
-        if self._due(SCENE_TOPIC, tick.began_s, SCENE_EVERY_S):
+        if self._is_due(SCENE_TOPIC, tick.began_s):
             scene = fg.scene_of(tick, time_ns, self._header.config.separation_m)
             if scene is not None:
                 self._add(SCENE_TOPIC, fg.SCENE_UPDATE, scene, time_ns)
-        if self._due(FIELD_TOPIC, tick.began_s, FIELD_EVERY_S):
+        if self._is_due(FIELD_TOPIC, tick.began_s):
             self._add(FIELD_TOPIC, fg.SCENE_UPDATE, fg.field_of(self._header, tick.surroundings, time_ns), time_ns)
-        if self._due(FIX_TOPIC, tick.began_s, FIX_EVERY_S):
+        if self._is_due(FIX_TOPIC, tick.began_s):
             for name, fix in fg.fixes_of(tick, self._header, time_ns).items():
                 self._add(FIX_TOPIC + name, fg.LOCATION_FIX, fix, time_ns)
 
-    def _tell_undrawn(self, error: Exception) -> None:
-        """Once, since it may happen at every tick."""
-        if not self._undrawn:
-            LOG.warning("drawing in the log failed", exc_info=error)
-            self.add_line(
-                fg.WARNING, "black box", f"drawing failed ({type(error).__name__}: {error}); the ticks are whole"
-            )
-        self._undrawn = True
-
-    def _due(self, topic: str, now_s: float, every_s: float) -> bool:
+    def _is_due(self, topic: str, now_s: float) -> bool:
         """Whether it is time for a topic again; times are kept in step so that ticks a little early count."""
         due = now_s >= self._due_s[topic] - 0.01
         if due:
-            self._due_s[topic] = now_s + every_s
+            self._due_s[topic] = now_s + EVERY_S[topic]
         return due
 
-    def _add(self, topic: str, schema: Schema, message: dict[str, Any], time_ns: int) -> None:
-        channel = self._channels.get(topic)
-        if channel is None:
-            channel = self._open(topic, schema)
-        self._last_ns = max(self._last_ns, time_ns)  # a log is read in order of time
-        data = json.dumps(message, allow_nan=False, separators=(",", ":"), default=plain).encode()
-        self._counts[topic] += 1
-        if topic != LINK_TOPIC:
-            self._chain.add(topic, (self._last_ns, self._last_ns, self._counts[topic]), data)
-        self._writer.add_message(channel, self._last_ns, data, self._last_ns, self._counts[topic])
+    def _add_line(self, level: int, name: str, text: str, time_ns: int | None = None) -> None:
+        """At the time of the last message when none is given."""
+        at_ns = self._last_ns if time_ns is None else time_ns
+        self._add(LOG_TOPIC, fg.LOG, fg.log_message(at_ns, level, name, text), at_ns)
 
-    def _link(self, link: Link) -> None:
+    def _link(self, end: str = "") -> None:
+        link = self._chain.next_link(end)
         self._add(LINK_TOPIC, LINK, vars(link), self._last_ns)
         self._chain.go_on(link)
 
-    def _open(self, topic: str, schema: Schema) -> int:
-        title = schema["title"]
-        if title not in self._schemas:
-            text = json.dumps(schema, separators=(",", ":")).encode()
-            self._schemas[title] = self._writer.register_schema(title, "jsonschema", text)
-        self._counts[topic] = 0
-        self._channels[topic] = self._writer.register_channel(topic, "json", self._schemas[title])
-        return self._channels[topic]
+    def _add(self, topic: str, schema: Schema, message: dict[str, Any], time_ns: int) -> None:
+        if topic not in self._channels:
+            title = schema["title"]
+            if title not in self._schemas:
+                text = json.dumps(schema, separators=(",", ":")).encode()
+                self._schemas[title] = self._writer.register_schema(title, "jsonschema", text)
+            self._channels[topic] = self._writer.register_channel(topic, "json", self._schemas[title])
+        self._last_ns = max(self._last_ns, time_ns)  # a log is read in order of time
+        data = json.dumps(message, allow_nan=False, separators=(",", ":"), default=plain).encode()
+        number = self._counts[topic] = self._counts.get(topic, 0) + 1
+        if topic != LINK_TOPIC:
+            self._chain.add(topic, (self._last_ns, self._last_ns, number), data)
+        self._writer.add_message(self._channels[topic], self._last_ns, data, self._last_ns, number)
 
 
-class McapWriter(AsyncWriter[Tick | tuple[int, str, str]]):
+class McapWriter(AsyncWriter[Tick | Line]):
     """Keeps ticks in an MCAP file, at most ``flush_s`` and the disk's own delay behind.
 
     The header is on the disk when this returns. A log proves the shield's decisions from the first tick that was

@@ -76,7 +76,7 @@ def test_an_attack_from_end_to_end_and_its_replay():
     done = run(*arguments, "--json", "copy.json")
     assert done.exit_code == ExitCode.OK, done.output  # only a shield is held to the bar
     content = json.loads(Path("copy.json").read_text())
-    assert keys.undocumented(content, keys.ATTACK) == []
+    assert keys.undocumented(content, keys.KEYS["attack"]) == []
     assert content["found"] == 2
     scene = Path("out") / content["searches"][0]["scene"]
     assert run("attack", "--guard", "none", "--replay", scene).exit_code == ExitCode.OK

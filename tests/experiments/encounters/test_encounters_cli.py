@@ -35,7 +35,7 @@ def test_a_small_run_from_end_to_end_and_again():
     done = run(*SMALL, "--guard", "none", "--out", "out", "--json", "copy.json")
     assert done.exit_code == ExitCode.OK, done.output
     content = json.loads(Path("copy.json").read_text())
-    assert keys.undocumented(content, keys.ENCOUNTERS) == []
+    assert keys.undocumented(content, keys.KEYS["encounters"]) == []
     assert (content["complete"], content["encounters_played"], content["encounters_resumed"]) == (True, 6, 0)
     assert [cell["family"] for cell in content["cells"]] == ["head_on", "doorway"]
     assert content["goals"] == []

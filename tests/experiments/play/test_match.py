@@ -5,10 +5,17 @@ import numpy as np
 import pytest
 from steerclear import policies
 from steerclear.env.config import GameConfig
-from steerclear.env.record import read_meta
+from steerclear.env.record import GameRecorder, read_meta
+from steerclear.env.render import Arena, Picture, Scene
+from steerclear.env.render.boats import boats_in_breach
+from steerclear.experiments.cli_games import STEERING
+from steerclear.experiments.play import match, recorder
 from steerclear.experiments.play.match import Match, play_match
 from steerclear.experiments.play.openings import GAP_M, opening
+from steerclear.experiments.play.recorder import PlayingEnv, live_view, read_infos
 from steerclear.experiments.play.spec import MatchSpec
+from steerclear.policies.entrants.play import EntrantTeam
+from steerclear.policies.keyboard import AHEAD, BACK, LEFT, RIGHT
 from steerclear.shield.exceptions import ConfigError, SteerclearError
 
 SHORT = {"max_time_s": 6.0}
@@ -152,11 +159,6 @@ def test_an_unusable_spec_is_refused(settings):
         play_match(replace(spec_of(), **settings))
 
 
-def test_an_unknown_side_is_refused():
-    with pytest.raises(ConfigError, match="did you mean blue"):
-        spec_of(side="bleu")
-
-
 def test_a_spec_travels_through_json_and_its_key_names_the_game():
     spec = spec_of(shield={"separation_m": 3.0})
     assert MatchSpec.of_job(json.loads(json.dumps(spec.as_job()))).key == spec.key
@@ -187,3 +189,122 @@ def test_an_opening_stays_clear_of_obstacles_and_says_when_there_is_no_room():
     config = GameConfig.preset("aamas2024", team_size=1, obstacles={"circle": [(4.0, (20.0, 20.0))]})
     place = np.array(opening(config, 0)["agent_position"][0])
     assert np.linalg.norm(place - [20.0, 20.0]) > 4.0 + GAP_M
+
+
+SPEC = MatchSpec(preset="aamas2024", own="ohto", opponent="medium", rules={"max_time_s": 1.0}, judge="none")
+
+
+class Curious(EntrantTeam):
+    """An entrant that looks at its infos."""
+
+    def decide(self, sight):
+        return [(0.0, boat.heading) for boat in sight.own]
+
+    def act(self, observations, infos):
+        self.seen = set(infos)
+        return super().act(observations, infos)
+
+
+@pytest.mark.parametrize(
+    ("teams", "read"),
+    [
+        ([policies.make("ohto"), policies.make("hard")], False),
+        ([policies.make("ohto"), policies.from_callable(lambda obs: 4)], True),
+        ([Curious(), policies.make("medium")], True),
+    ],
+)
+def test_infos_are_written_where_somebody_may_read_them(teams, read):
+    assert read_infos(teams) == read
+
+
+def test_a_policy_that_reads_infos_gets_them_in_a_match():
+    game = Match(SPEC)
+    curious = Curious()
+    game.seat(0, curious)
+    game.play()
+    game.close()
+    assert curious.seen == set(game.env.possible_agents)
+    game = Match(SPEC)
+    game.play()
+    game.close()
+    assert game.env.infos() == {}
+
+
+class Recorded:
+    """The recorder of the library, in the place of a match's recorder."""
+
+    def __init__(self, game, meta):
+        self._game, self._recorder = game, GameRecorder()
+        self._recorder.start(game, meta)
+        self.finish = self._recorder.finish
+
+    def step(self, *given):
+        self._recorder.step(self._game, *given)
+
+
+def test_a_record_is_the_same_with_infos_and_by_the_library(monkeypatch):
+    monkeypatch.setattr(recorder, "FIRST_ROWS", 2)  # so that it has to make room
+    lean = match.play_match(SPEC).record
+    monkeypatch.setattr(match, "read_infos", lambda teams: True)
+    monkeypatch.setattr(match, "Recorder", Recorded)
+    whole = match.play_match(SPEC).record
+    assert set(lean) == set(whole)
+    for name in lean:
+        assert lean[name].dtype == whole[name].dtype
+        np.testing.assert_array_equal(lean[name], whole[name])
+
+
+def test_a_live_view_is_of_this_moment():
+    env = PlayingEnv("aamas2024")
+    env.reset(seed=1)
+    live = live_view(env.core)
+    for _ in range(3):
+        env.step(dict.fromkeys(env.agents, (1.0, 20.0)))
+        view = env.view()
+        for name in vars(live):
+            np.testing.assert_array_equal(getattr(live, name), getattr(view, name))
+
+
+def drawn(record, **changes):
+    arena = replace(Arena.from_meta(read_meta(record)), **changes)
+    surface = Picture(arena, 1280, "light").draw(Scene.from_record(record, 20, 0.1), True)
+    return np.frombuffer(surface.get_buffer().raw, np.uint8).reshape(surface.get_height(), -1).copy()
+
+
+def test_the_steered_boat_is_ringed_and_the_keys_stand_below(game_record):
+    plain, marked = drawn(game_record), drawn(game_record, steered=frozenset(["agent_0"]))
+    changed = (plain != marked).any(axis=1)
+    assert changed[-40:].any(), "the keys"
+    assert changed[62:-40].any(), "the ring and the name"
+    assert not (drawn(game_record, steered=frozenset()) != plain).any()
+
+
+@pytest.mark.parametrize("keys", [AHEAD, BACK, LEFT, RIGHT])
+def test_the_keys_told_are_those_that_are_read(keys):
+    assert all(key in STEERING.replace(",", "").replace(":", "").split() for key in keys)
+
+
+@pytest.mark.parametrize(("own", "opponent", "steered"), [
+    ("keyboard", "hold", {"agent_0"}), ("hold", "keyboard", {"agent_3"}), ("hold", "easy", set()),
+])  # fmt: skip
+def test_the_first_boat_of_a_keyboard_team_is_steered(own, opponent, steered):
+    match = Match(MatchSpec(preset="aamas2024", own=own, opponent=opponent), "human" if steered else None)
+    try:
+        assert match._steered() == steered
+    finally:
+        match.close()
+
+
+def test_breaches_of_others_among_themselves_are_not_marked_where_boats_are_shielded(game_record):
+    """Boats 2 and 3 are nobody's that is shielded: their picture is the same however close they are."""
+    record = {name: array.copy() for name, array in game_record.items()}
+    record["position"][:, 3] = record["position"][:, 2] + [0.0, 1.0]
+    arena = Arena.from_meta(read_meta(record))
+    scene = Scene.from_record(record, 20, 0.1)
+    assert (2, 3) in boats_in_breach(scene, arena.separation_m)
+    shielded, other = drawn(record), drawn(record, shielded=frozenset(["agent_2"]))
+    breach = np.array([190, 24, 147])
+    count = [
+        int((rows.reshape(len(rows), -1, 4)[..., 2::-1] == breach).all(axis=2).sum()) for rows in (shielded, other)
+    ]
+    assert count[0] < count[1]

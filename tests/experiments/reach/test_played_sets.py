@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from steerclear.experiments import cli
 from steerclear.experiments.docs import write_pages
-from steerclear.experiments.docs_keys import PLAYED_SETS, undocumented
+from steerclear.experiments.docs_keys import KEYS, undocumented
 from steerclear.experiments.reach import sets
 from steerclear.experiments.reach.pages import PLAYED_HEADS, played_goals, played_rows
 from steerclear.experiments.reach.sets import RATIO_GOAL, PlayedSet, duels_lost, games_lost, play_job, values_m
@@ -122,7 +122,7 @@ def test_the_command_goes_on_where_it_was_cut_off_and_makes_a_page(tmp_path, few
     assert first.exit_code == 0, first.output
     content = json.loads(file.read_text())
     assert content == json.loads((folder / "results.json").read_text())
-    assert undocumented(content, PLAYED_SETS) == []
+    assert undocumented(content, KEYS["reach play"]) == []
     assert content["sets"][0]["played"] > 10
     refused = play("--out", str(folder))
     assert refused.exit_code == 2

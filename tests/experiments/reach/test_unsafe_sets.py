@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from steerclear.experiments import cli
 from steerclear.experiments.docs import write_pages
-from steerclear.experiments.docs_keys import SETS, undocumented
+from steerclear.experiments.docs_keys import KEYS, undocumented
 from steerclear.experiments.reach import sets
 from steerclear.experiments.reach.pages import SETS_HEADS, sets_content, sets_goals, sets_rows
 from steerclear.experiments.reach.sets import (
@@ -152,7 +152,7 @@ def test_the_command_writes_documented_json_that_becomes_a_page(tmp_path, head_o
     result = compare("--json", str(file), "--shield-set", "straight_horizon_s=5")
     assert result.exit_code == 0, result.output
     content = json.loads(file.read_text())
-    assert undocumented(content, SETS) == []
+    assert undocumented(content, KEYS["reach compare"]) == []
     assert content["settings"] == head(straight_horizon_s=5)["settings"]
     assert content["versions"]["steerclear"]
     assert content["machine"]["cores"] >= 1

@@ -5,7 +5,7 @@ import socket
 import pytest
 from steerclear.env.record import load
 from steerclear.experiments.cli import app
-from steerclear.experiments.docs_keys import SIM_BOATS, undocumented
+from steerclear.experiments.docs_keys import KEYS, undocumented
 from steerclear.experiments.sim_boats import SimFleet
 from steerclear.experiments.sim_boats.demo import demo_fleet, demo_text
 from steerclear.experiments.sim_boats.faults import Incident, parse_incident
@@ -79,7 +79,7 @@ def test_runs_and_writes_figures_and_record(fleet_path, tmp_path):
     result = runner.invoke(app, ["sim-boats", str(fleet_path), *options, *faults, *files])
     assert result.exit_code == 0, result.output
     content = json.loads(figures.read_text())
-    assert undocumented(content, SIM_BOATS) == []
+    assert undocumented(content, KEYS["sim-boats"]) == []
     assert content["simulated_s"] >= 4.0
     assert content["played"]
     assert content["clean"] == (not content["breaches"])

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import pytest
 from bridge_fakes import fleet_of, fleet_text
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
-from steerclear.shield.bridge.autopilot_fence import check_fence, hard_line, needed_m, stopping_way_m
 from steerclear.shield.bridge.fleet_file import parse_fleet
+from steerclear.shield.bridge.link_checks import check_fence, hard_line, needed_m, stopping_way_m
 from steerclear.shield.bridge.mavlink.fence import FenceReader, FenceZone
 from steerclear.shield.platforms import get_platform
 
@@ -89,6 +89,16 @@ def test_a_fence_nobody_heard_is_not_taken_and_one_that_is_off_is():
     assert "cannot be read" in checked(None).text
     assert checked(None, {"FENCE_ENABLE": 0.0}).passed
     assert checked(None, {}).passed
+
+
+@pytest.mark.parametrize(
+    ("action", "words"),
+    [(0.0, "only reports"), (1.0, "FENCE_ACTION is 1 (RTL)"), (4.0, "past the shield: set it to 2"), (2.0, "")],
+)
+def test_a_fence_is_a_last_resort_only_where_it_holds_the_boat(action, words):
+    result = checked([box(80.0)], {**ON, "FENCE_ACTION": action})
+    assert result.passed == (not words), result.text
+    assert words in result.text
 
 
 def test_where_boats_may_flee_for_ever_no_fence_is_taken():

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from bridge_fakes import fleet_of
 from steerclear.shield import Commands
-from steerclear.shield.bridge.contact_fusion import MOST_SOURCES, MOST_STORIES, ContactFusion
 from steerclear.shield.bridge.failsafe import Failsafe, Seen
 from steerclear.shield.bridge.fleet_settings import ContactLimit
 from steerclear.shield.bridge.messages import Answer, BoatReading, Contact
 from steerclear.shield.bridge.operator import Override
-from steerclear.shield.bridge.tracker import Tracker
+from steerclear.shield.bridge.tracker import MOST_SOURCES, MOST_STORIES, ContactFusion, Tracker
 
 LIMIT = ContactLimit()
 

@@ -188,7 +188,6 @@ def test_nothing_is_known_before_the_first_fix():
     estimator.advance(1.0)
     estimator.sent(1.0, math.nan, 0.0)
     assert estimator.estimate(1.0) is None
-    assert not estimator.known
 
 
 def test_a_standstill_of_the_loop_is_made_up_in_bounds():

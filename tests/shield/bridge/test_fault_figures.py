@@ -104,13 +104,13 @@ def driven(strike, settings):
     if fed:  # somebody else sees it too
         world.contacts.rows["blue_1"] = world.links["blue_1"].row
         world.contacts.advance = lambda dt_s: None
-    seen, take = [], world.loop._recorder.take
+    seen, take = [], world.sink.take
 
     def note(tick):
         seen.append((tick.began_s - STRUCK_S, {(a.condition, a.response) for a in tick.actions}))
         take(tick)
 
-    world.loop._recorder.take = note
+    world.sink.take = note
     world.run(STRUCK_S - 1000.0 + AFTER_S, lambda world: world.clock.now_s() >= STRUCK_S - 1e-6 and strike(world))
     return seen, world
 

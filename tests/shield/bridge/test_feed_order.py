@@ -160,23 +160,3 @@ def test_sealed_packets_are_not_believed_again_however_long_their_sender_is_sile
     assert [order.problem(entry, 50.0 + 0.1 * k) for k, entry in enumerate(new)] == [None] * 10
     for entry in (*old, *new):
         assert order.problem(entry, 500.0)[0] == "replayed"
-
-
-def test_sealed_packets_held_back_are_as_late_as_they_are(monkeypatch, clock):
-    order, start = Order(KEY), clock.now()
-    ticks = start
-
-    def heard(seq, sent_s, at_s, run=7, ahead_s=-20.0):
-        nonlocal ticks
-        ticks = start + round(at_s * TICKS_PER_S)
-        sent = packet(seq, run=run, stamp=start + round((sent_s + ahead_s) * TICKS_PER_S))
-        assert order.problem(sent, at_s) is None
-        return order._senders[sent.sender].late_s
-
-    monkeypatch.setattr(order._stamps, "now", lambda: ticks)
-    assert heard(1, 0.0, 0.2) == 0.0, "how far its clock is off is nobody's delay"
-    assert heard(2, 1.0, 1.0) == 0.0, "the quickest so far"
-    assert heard(3, 2.0, 2.3) == pytest.approx(0.3, abs=0.01)
-    assert heard(4, 3.0, 33.0) == pytest.approx(30.0, abs=0.1), "after a silence too"
-    assert heard(5, 34.0, 34.0) == pytest.approx(0.0, abs=0.1)
-    assert heard(1, 40.0, 40.0, run=8, ahead_s=-25.0) == 0.0, "another start may have another clock"

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from steerclear.shield.bridge.autopilot_parameters import ASKED
+from steerclear.shield.bridge.autopilot_parameters import ASKED, FENCE_ASKED
 from steerclear.shield.bridge.clock import ManualClock
 from steerclear.shield.bridge.link_checks import (
     Watched,
@@ -100,68 +100,47 @@ def test_a_link_that_breaks_while_watched_fails_its_checks_and_says_so():
     assert all("no such wire" in r.text for r in results)
 
 
-@pytest.mark.parametrize(
-    ("said", "changes", "words"),
-    [
-        ({}, {"missing": "ATTITUDE at 3.0 of 20 Hz"}, "ATTITUDE at 3.0 of 20 Hz; lower rate_hz"),
-        ({"age": 0.8}, {}, "0.80 s old, more than 0.5 s"),
-        ({"age": math.inf}, {}, "wait for GPS"),
-        ({"age": math.nan}, {}, "check the radio"),
-        ({"faults": {"no_fix": 2, "duplicate": 9}}, {}, "refused while watched: 2 no_fix;"),
-        ({"count": 0}, {}, "inf s old"),
-    ],
-)
-def test_rates(said, changes, words):
-    result = found(check_rates, replace(GOOD, **changes), readings(**said))
-    assert not result.passed
-    assert words in result.text
-
-
-def test_repeats_and_disorder_are_no_reason_not_to_start():
-    assert found(check_rates, GOOD, readings(faults={"duplicate": 4, "out_of_order": 2})).passed
-
-
-def test_latency():
-    assert found(check_latency, GOOD).figures["round_trip_median_s"] == pytest.approx(0.04)
-    slow = found(check_latency, replace(GOOD, round_trips_s=(0.05,) * 18 + (0.9,) * 4))
-    assert not slow.passed
-    assert "0.90 s (95 of 100), more than 0.2 s" in slow.text
-    silent = found(check_latency, replace(GOOD, round_trips_s=()))
-    assert not silent.passed
-    assert "answers no TIMESYNC" in silent.text
-    assert not found(check_latency, replace(GOOD, round_trips_s=(math.nan,) * 3)).passed
+LATE = [replace(reading, position_age_s=7.6, heading_age_s=7.6, velocity_age_s=7.6) for reading in readings()]
+BOOTING = [replace(reading, position_age_s=7.6, velocity_age_s=7.6) for reading in readings()]
 
 
 @pytest.mark.parametrize(
-    ("changes", "words"),
+    ("check", "said", "changes", "words"),
     [
-        ({"clock_starts": 0}, "no time-stamped telemetry"),
-        ({"clock_starts": 2}, "restarted while connected; check its power"),
-        ({"signs": True, "wall_ahead_s": -90.0}, "-90 s from the boat's GPS time"),
+        (check_rates, readings(), {"missing": "ATTITUDE at 3.0 of 20 Hz"}, "ATTITUDE at 3.0 of 20 Hz; lower rate_hz"),
+        (check_rates, readings(age=0.8), {}, "0.80 s old, more than 0.5 s"),
+        (check_rates, readings(age=math.inf), {}, "wait for GPS"),
+        (check_rates, readings(age=math.nan), {}, "check the radio"),
+        (check_rates, readings(faults={"no_fix": 2, "duplicate": 9}), {}, "refused while watched: 2 no_fix;"),
+        *((check_rates, readings(faults={k: 5}), {}, f"5 {k}") for k in ("fix_silent", "poor_fix", "no_estimate")),
+        (check_rates, [], {}, "inf s old"),
+        (check_rates, LATE, {}, "telemetry was 7.60 s old"),
+        (check_rates, BOOTING, {"fix_type": 1, "fix_fault": "GPS has no fix"}, "no position yet (GPS has no fix)"),
+        (check_latency, [], {"round_trips_s": (0.05,) * 18 + (0.9,) * 4}, "0.90 s (95 of 100), more than 0.2 s"),
+        (check_latency, [], {"round_trips_s": ()}, "answers no TIMESYNC"),
+        (check_latency, [], {"round_trips_s": (math.nan,) * 3}, "take a faster radio"),
+        (check_clock, [], {"clock_starts": 0}, "no time-stamped telemetry"),
+        (check_clock, [], {"clock_starts": 2}, "restarted while connected; check its power"),
+        (check_clock, [], {"signs": True, "wall_ahead_s": -90.0}, "-90 s from the boat's GPS time"),
+        (check_spread, readings(spread_m=1.0), {}, "wait for a better fix"),
+        (check_spread, readings(speed=1.0), {}, "moves at 1.0 m/s"),
+        (check_spread, readings(age=1.0), {}, "no position to watch"),
+        (check_spread, readings(spread_m=math.nan), {}, "no position to watch"),
+        (check_spread, [], {}, "no position to watch"),
+        (check_autopilot, [], {"fix_type": 1}, "GPS has no fix (fix type 1): wait for one"),
+        (check_autopilot, [], {"fix_type": -1}, "does not say whether GPS has a fix"),
+        (check_autopilot, [], {"fix_fault": "GPS fix is poor"}, "GPS fix is poor: wait for a good GPS fix"),
+        (check_autopilot, [], {"parameters": {}, "version": None}, "WP_SPEED is not known"),
+        (check_commanders, [], {"stations": frozenset({(255, 190)})}, "on the link (system 255 component 190)"),
+        (check_commanders, [], {"other_commander_s": 97.0}, "somebody else commanded it 3 s ago; end that program"),
+        (check_commanders, [], {"faults": {"bad_signature": 4}}, "refused 4 bad_signature: somebody sends in this"),
+        (check_commanders, [], {"faults": {"second_sender": 1}}, "find them before you start"),
     ],
 )
-def test_clock(changes, words):
-    result = found(check_clock, replace(GOOD, **changes))
+def test_each_fault_is_found_and_named(check, said, changes, words):
+    result = found(check, replace(GOOD, **changes), said)
     assert not result.passed
     assert words in result.text
-
-
-def test_a_wrong_wall_clock_matters_to_signing_only():
-    assert found(check_clock, replace(GOOD, wall_ahead_s=3600.0)).passed
-    assert found(check_clock, replace(GOOD, signs=True, wall_ahead_s=math.nan)).passed
-
-
-def test_spread():
-    assert found(check_spread, GOOD, readings()).figures["spread_rms_m"] == pytest.approx(0.042, abs=0.01)
-    wide = found(check_spread, GOOD, readings(spread_m=1.0))
-    assert not wide.passed
-    assert "wait for a better fix" in wide.text
-    moving = found(check_spread, GOOD, readings(speed=1.0))
-    assert not moving.passed
-    assert "moves at 1.0 m/s" in moving.text
-    assert not found(check_spread, GOOD, readings(age=1.0)).passed
-    assert not found(check_spread, GOOD, readings(spread_m=math.nan)).passed
-    assert not found(check_spread, GOOD, []).passed
 
 
 @pytest.mark.parametrize(
@@ -188,6 +167,10 @@ def test_spread():
         ({"AVOID_ENABLE": 7.0, "BCN_TYPE": 1.0}, "AVOID_ENABLE has bit 2 and BCN_TYPE is on"),
         ({"OA_TYPE": 1.0}, "OA_TYPE is 1, so the autopilot changes commands after the shield: set OA_TYPE to 0"),
         ({"SAIL_ENABLE": 1.0}, "set SAIL_ENABLE to 0"),
+        ({"FS_ACTION": 1.0}, "FS_ACTION is 1 (RTL), so the autopilot would sail among boats past the shield"),
+        ({"FS_ACTION": 6.0}, "FS_ACTION is 6 (Loiter or Hold)"),
+        ({"BATT_FS_LOW_ACT": 4.0}, "BATT_FS_LOW_ACT is 4 (SmartRTL or Hold)"),
+        ({"BATT_FS_CRT_ACT": 3.0}, "BATT_FS_CRT_ACT is 3"),
     ],
 )
 def test_autopilot(parameters, words):
@@ -211,6 +194,8 @@ def test_autopilot(parameters, words):
         {"FENCE_ENABLE": 1.0, "AVOID_ENABLE": 0.0},
         {"AVOID_ENABLE": 3.0, "PRX1_TYPE": 0.0},
         {"OA_TYPE": 0.0},
+        {"FS_ACTION": 2.0, "BATT_FS_LOW_ACT": 0.0, "BATT_FS_CRT_ACT": 5.0},
+        {"FS_ACTION": 0.0},
     ],
 )
 def test_an_autopilot_whose_settings_change_nothing_passes(parameters):
@@ -219,23 +204,22 @@ def test_an_autopilot_whose_settings_change_nothing_passes(parameters):
 
 
 @pytest.mark.parametrize(
-    ("changes", "words"),
+    ("check", "said", "changes"),
     [
-        ({"fix_type": 1}, "GPS has no fix (fix type 1): wait for one"),
-        ({"fix_type": 2}, "fix type 2"),
-        ({"fix_type": -1}, "does not say whether GPS has a fix"),
-        ({"fix_fault": "GPS fix is poor (HDOP 9.9)"}, "GPS fix is poor (HDOP 9.9): wait for a good GPS fix"),
+        (check_rates, readings(faults={"duplicate": 4, "out_of_order": 2}), {}),
+        (check_clock, [], {"wall_ahead_s": 3600.0}),
+        (check_clock, [], {"signs": True, "wall_ahead_s": math.nan}),
+        (check_commanders, [], {"signs": True, "faults": {"unsigned": 3, "replayed": 1}}),
     ],
 )
-def test_a_boat_without_a_fix_does_not_pass(changes, words):
-    result = found(check_autopilot, replace(GOOD, **changes))
-    assert not result.passed
-    assert words in result.text
+def test_what_is_no_reason_not_to_start(check, said, changes):
+    assert found(check, replace(GOOD, **changes), said).passed
 
 
-@pytest.mark.parametrize("kind", ["no_fix", "fix_silent", "poor_fix", "no_estimate"])
-def test_a_fix_lost_while_watched_does_not_pass(kind):
-    assert f"5 {kind}" in found(check_rates, GOOD, readings(faults={kind: 5})).text
+def test_figures_and_words_of_a_good_link():
+    assert found(check_latency).figures["round_trip_median_s"] == pytest.approx(0.04)
+    assert found(check_spread, said=readings()).figures["spread_rms_m"] == pytest.approx(0.042, abs=0.01)
+    assert found(check_commanders).text.endswith("not signed")
 
 
 def test_what_was_refused_before_the_watch_is_not_of_it():
@@ -246,37 +230,6 @@ def test_what_was_refused_before_the_watch_is_not_of_it():
 
 def test_every_parameter_that_is_looked_at_is_asked_for():
     assert {"MAV_GCS_SYSID", "MAV_OPTIONS", "ARMING_SKIPCHK", "FENCE_ENABLE", "AVOID_ENABLE", "OA_TYPE"} <= {*ASKED}
+    assert {"FS_ACTION", "BATT_FS_LOW_ACT", "BATT_FS_CRT_ACT"} <= {*ASKED}
+    assert "FENCE_ACTION" in FENCE_ASKED
     assert {"SYSID_MYGCS", "SYSID_ENFORCE", "ARMING_CHECK", "GUID_TIMEOUT"} <= {*ASKED}
-
-
-def test_an_autopilot_that_told_nothing_does_not_pass():
-    assert not found(check_autopilot, replace(GOOD, parameters={}, version=None)).passed
-
-
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"stations": frozenset({(255, 190)})}, "another ground station is on the link (system 255 component 190)"),
-        ({"other_commander_s": 97.0}, "somebody else commanded it 3 s ago; end that program"),
-        ({"faults": {"bad_signature": 4}}, "refused 4 bad_signature: somebody sends in this boat's name"),
-        ({"faults": {"second_sender": 1}}, "find them before you start"),
-    ],
-)
-def test_commanders(changes, words):
-    result = found(check_commanders, replace(GOOD, **changes))
-    assert not result.passed
-    assert words in result.text
-
-
-def test_signing_is_said():
-    assert found(check_commanders, GOOD).text.endswith("not signed")
-    assert found(check_commanders, replace(GOOD, signs=True, faults={"unsigned": 3, "replayed": 1})).passed
-
-
-def test_an_autopilot_that_has_no_position_yet_is_not_told_as_old_telemetry():
-    booting = [replace(reading, position_age_s=7.6, velocity_age_s=7.6) for reading in readings()]
-    result = found(check_rates, replace(GOOD, fix_type=1, fix_fault="GPS has no fix"), booting)
-    assert not result.passed
-    assert "the autopilot has no position yet (GPS has no fix)" in result.text
-    late = [replace(reading, position_age_s=7.6, heading_age_s=7.6, velocity_age_s=7.6) for reading in readings()]
-    assert "telemetry was 7.60 s old" in found(check_rates, GOOD, late).text

@@ -167,6 +167,15 @@ def test_a_boat_beyond_its_hard_line_is_stopped_by_its_link_at_once_and_handed_o
     assert len(link.sent) > sent
 
 
+def test_a_boat_that_is_beyond_its_hard_line_once_a_command_works_is_handed_over_in_that_turn():
+    text = fleet_text(blue=1, red=0, more="shield: {delay_s: 0.3}").replace(GEOFENCE, LINES)
+    world = World(parse_fleet(text), [(40.0, 64.6, 0.0, 2.0)], straight(NORTH)).run(0.2)
+    first, second = world.sink.ticks[:2]
+    assert first.decisions.outside_m[0] < 5.0, "the shield runs it on by the delay"
+    assert [a.condition for a in first.actions if a.response == "stop"] == ["hard_line"]
+    assert any(a.condition == "hard_line" and "take it back" in a.text for a in second.actions)
+
+
 def test_a_boat_that_can_only_stop_before_a_shore_is_stopped_by_its_link_and_goes_on_by_itself():
     shore = Surroundings(polygons=[((-30.0, 20.0), (110.0, 20.0), (110.0, 30.0), (-30.0, 30.0))])
     fleet = parse_fleet(fleet_text(blue=1, red=0).replace(GEOFENCE, LINES))

@@ -243,7 +243,6 @@ class Slow:
     def keep(self, item): pass
     def flush(self): time.sleep(0.2)  # so that the process is suspended while something is on its way
     def finish(self): pass
-    abandon = finish
 
 spool = AsyncWriter("run", Slow(), flush_s=0.02, give_up_s=1.5)
 print("begun", flush=True)

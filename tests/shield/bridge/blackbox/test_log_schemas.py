@@ -11,8 +11,7 @@ from forged_logs import read_records
 from hypothesis import given
 from logged_runs import Encounter, header_of
 from steerclear.shield.bridge.blackbox import McapWriter, mend
-from steerclear.shield.bridge.blackbox.format import tick_from_json, tick_to_json
-from steerclear.shield.bridge.blackbox.records import TICK
+from steerclear.shield.bridge.blackbox.format import TICK, tick_from_json, tick_to_json
 from steerclear.shield.exceptions import LogError
 from test_log_round_trip import HERON, quick, same, ticks
 

@@ -5,12 +5,12 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from steerclear.shield.bridge.contact_fusion import ContactFusion
 from steerclear.shield.bridge.fleet_settings import ContactLimit
 from steerclear.shield.bridge.frame import FieldFrame
 from steerclear.shield.bridge.moos.contacts import MoosContacts, parse_report
 from steerclear.shield.bridge.moos.nav import Navigation
 from steerclear.shield.bridge.moos.wire import Message
+from steerclear.shield.bridge.tracker import ContactFusion
 
 FRAME = FieldFrame(42.0, -71.0)
 REPORT = "NAME=red_1,X=10.5,Y=-3,SPD=1.5,HDG=90,TYPE=HERON,MODE=DRIVE,TIME={time},LENGTH=4"

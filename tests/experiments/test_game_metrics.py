@@ -1,12 +1,104 @@
+"""What happened in a game, as numbers: against cases worked out by hand, and the recorder's own count."""
+
 import json
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from steerclear.env.config import GameConfig
-from steerclear.env.record import make_record
+from steerclear.env.record import find_breaches, make_record
 from steerclear.env.record_meta import meta_of
-from steerclear.experiments.game_metrics import check_penalty, reason_counts, scores, tally
+from steerclear.experiments.game_metrics import (
+    PairDistances,
+    check_penalty,
+    count_breaches,
+    count_deadlocks,
+    count_reversals,
+    deadlocks,
+    entries,
+    heading_change_deg,
+    reason_counts,
+    scores,
+    tally,
+    team_pairs,
+)
 from steerclear.shield.exceptions import ConfigError
+
+
+def two_boats(*gaps_m):
+    """A track of two boats on a line, this far apart at the start and after every step."""
+    track = np.zeros((len(gaps_m), 2, 2))
+    track[:, 1, 0] = gaps_m
+    return PairDistances.of(track)
+
+
+@pytest.mark.parametrize(
+    ("gaps_m", "count"),
+    [
+        ((5, 4, 3, 2, 2, 3, 4), 1),  # one visit is one breach, however long
+        ((5, 2, 5, 2, 5), 2),  # two visits
+        ((5, 2.5, 5), 1),  # exactly on the radius is inside
+        ((5, 2.5000001, 5), 0),
+        ((2, 5, 5), 0),  # the start position itself is not counted
+        ((2, 2, 5, 2), 2),  # but a pair that starts inside counts at the first step
+        ((5,), 0),  # no step at all
+    ],
+)
+def test_breaches_are_counted_once_per_entry(gaps_m, count):
+    assert count_breaches(two_boats(*gaps_m), 2.5) == count
+
+
+def test_a_wider_radius_merges_visits():
+    track = two_boats(9, 2, 3, 2, 9)
+    assert count_breaches(track, 2.5) == 2
+    assert count_breaches(track, 4.0) == 1
+
+
+def test_pairs_of_a_team():
+    team = [0, 0, 1, 1]
+    distances = PairDistances.of(np.zeros((1, 4, 2)))
+    own = distances.of_pairs(team_pairs(team, 0, "teammate"))
+    across = distances.of_pairs(team_pairs(team, 0, "opponent"))
+    assert own.pairs.tolist() == [[0, 1]]
+    assert across.pairs.tolist() == [[0, 2], [0, 3], [1, 2], [1, 3]]
+    assert own.closest_m() == np.inf
+
+
+@given(st.lists(st.integers(0, 40).map(lambda n: n / 4), min_size=1, max_size=40), st.sampled_from([0.5, 2.5, 4.0]))
+def test_count_agrees_with_the_recorder_and_swapping_boats_changes_nothing(gaps_m, radius_m):
+    distances = two_boats(*gaps_m)
+    moved = PairDistances(distances.pairs[:, ::-1], distances.distance_m)
+    track = np.zeros((len(gaps_m), 2, 2))
+    track[:, 1, 0] = gaps_m
+    assert len(find_breaches(track, radius_m)) == count_breaches(distances, radius_m)
+    assert count_breaches(moved, radius_m) == count_breaches(distances, radius_m)
+    assert entries(distances, radius_m).shape == distances.distance_m.shape
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: PairDistances.of(np.zeros((3, 2))), "shape"),
+        (lambda: PairDistances.of(np.full((3, 2, 2), np.nan)), "not finite"),
+        (lambda: count_breaches(two_boats(1, 2), -1.0), "must be positive"),
+        (lambda: count_breaches(two_boats(1, 2), float("nan")), "must be positive"),
+    ],
+)
+def test_bad_input_is_one_clear_error(call, words):
+    with pytest.raises(ConfigError, match=words):
+        call()
+
+
+def test_reversals_are_changes_of_the_commanded_side():
+    heading = np.zeros((6, 2))
+    command = np.array([[20, 0], [-20, 0], [2, 0], [-20, 4], [20, -4], [20, 0]], dtype=float)
+    assert count_reversals(command, heading) == 2
+
+
+def test_heading_changes_wrap():
+    np.testing.assert_allclose(heading_change_deg([170.0, -170.0, 10.0], [-170.0, 170.0, -10.0]), [-20.0, 20.0, 20.0])
+
 
 REASONS = ["PASSED", "QP", "QP_RELAXED", "BACKUP", "BEST_EFFORT", "HELD", "NOT_COVERED", "RIGHT_OF_WAY"]
 
@@ -120,15 +212,11 @@ def test_a_single_boat_has_no_team_mate_to_be_close_to():
     record = record_of(np.zeros((3, 4, 2)))
     alone = {name: array[:, :2] if array.ndim > 1 and array.shape[1] == 4 else array for name, array in record.items()}
     alone["flag_position"], alone["breaches"] = record["flag_position"], record["breaches"]
-    alone["meta"] = np.array(json.dumps(json.loads(str(make_meta(config)))))
+    meta = meta_of(config, reason_names=REASONS)
+    alone["meta"] = np.array(json.dumps(meta, default=lambda value: np.asarray(value).tolist()))
     counts = tally(alone, 0)
     assert counts["closest_teammate_m"] is None
     assert counts["closest_m"] == counts["closest_opponent_m"] == 0.0
-
-
-def make_meta(config):
-    arrays = {"meta": meta_of(config, reason_names=REASONS)}
-    return json.dumps(arrays["meta"], default=lambda value: np.asarray(value).tolist())
 
 
 def test_scores():
@@ -141,3 +229,38 @@ def test_scores():
 def test_a_penalty_is_a_number_from_zero_on(penalty):
     with pytest.raises(ConfigError, match="--penalty must be"):
         check_penalty(penalty)
+
+
+OWN = np.array([True, True, False])
+
+
+def still(steps, speed_mps=0.1, wanted_mps=1.0):
+    return np.full((steps, 3), speed_mps), np.full((steps, 3), wanted_mps)
+
+
+@pytest.mark.parametrize(
+    ("steps", "speed_mps", "wanted_mps", "expected"),
+    [(101, 0.1, 1.0, 1), (100, 0.1, 1.0, 0), (101, 0.3, 1.0, 0), (101, 0.1, 0.0, 0), (1000, 0.1, 1.0, 1)],
+)
+def test_a_deadlock_is_two_mates_that_want_to_move_and_do_not_for_ten_seconds(steps, speed_mps, wanted_mps, expected):
+    assert count_deadlocks(*still(steps, speed_mps, wanted_mps), OWN, 0.1) == expected
+
+
+def test_ten_seconds_are_ten_seconds_at_any_step():
+    assert count_deadlocks(*still(51), OWN, 0.2) == 1
+    assert count_deadlocks(*still(50), OWN, 0.2) == 0
+
+
+def test_each_begins_anew_once_somebody_moved_and_opponents_are_none_of_it():
+    speed_mps, wanted_mps = still(300)
+    speed_mps[150, 0] = speed_mps[:, 2] = 1.0
+    assert count_deadlocks(speed_mps, wanted_mps, OWN, 0.1) == 2
+    assert count_deadlocks(speed_mps, wanted_mps, ~OWN, 0.1) == 0
+
+
+def test_games_are_counted_apart():
+    speed_mps, wanted_mps = still(101)
+    two = np.stack([speed_mps, speed_mps + 1.0], axis=1)
+    out = np.full(2, -1.0)
+    deadlocks(two, np.stack([wanted_mps, wanted_mps], axis=1), OWN, 100, out)
+    assert out.tolist() == [1.0, 0.0]
