@@ -8,9 +8,9 @@ from steerclear.shield.jit import Array, lean_kernel
 
 from . import rules as R
 from .arrays import Games, Rules
-from .collisions import check_collisions, look_for_contacts
 from .drive_home import decide_games
 from .motion import move_boats, place_boats
+from .rules import check_collisions, look_for_contacts
 
 CHUNK = 64
 """Games handled together, rule by rule."""

@@ -13,9 +13,8 @@ from steerclear.shield.shared import share
 
 from .config import GameConfig
 from .field import CORNER_INSET_M, FieldGeometry, own_corners
-from .observation_layout import boat_slots
+from .observation_layout import boat_slots, pack_lines
 from .obstacles import Obstacles, pack_obstacles
-from .sight import pack_lines
 
 
 class Rules(NamedTuple):

@@ -26,13 +26,12 @@ from .arrays import make_games, make_rules
 from .config import GameConfig, as_config
 from .drive_home import decide_commands
 from .field import field_geometry
-from .initial import start_from
 from .observation_layout import observation_bounds, observation_keys
 from .observe import observe_games
 from .power_play import toggle_power_plays
 from .randomness import seed_states
-from .reward import reward_games
-from .starts import default_places, reset_games, start_where_seen
+from .rules import reward_games
+from .starts import default_places, reset_games, start_from, start_where_seen
 from .validation import check_count
 from .view import GameView, restore_game, view_game
 
@@ -153,7 +152,7 @@ class BatchedMctf:
         self.games.rng[chosen] = seed_states(seed, self.n_games)[chosen]
 
     def reset_game(self, game: int, init: Mapping[str, Any]) -> np.ndarray:
-        """Start one game from a partial state, see `steerclear.env.initial.start_from`; the others go on.
+        """Start one game from a partial state, see `steerclear.env.starts.start_from`; the others go on.
 
         Returns:
             Observations (B, n, n_obs) float32, normalised, of all games.

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from steerclear.shield.jit import Array
+from gymnasium.spaces import Box
+from steerclear.shield.exceptions import GameError
+from steerclear.shield.jit import Array, lean_kernel
+from steerclear.shield.platforms import layout as L
 
+from .angles import wrap_bearing
+from .arrays import Games, Rules
+from .config import GameConfig
 from .core import BatchedMctf
-from .global_state import describe_game, entry_size, global_state_bounds, global_state_keys
-from .normalizer import VectorNormalizer
-from .observation_layout import Key
+from .field import FieldGeometry
+from .observation_layout import Key, sight_of_line
 from .observe import observe_raw
+from .obstacles import distance_and_heading
 
 BOOLEAN_ENTRIES = frozenset(
     {"has_flag", "on_side", "oob", "is_tagged", "is_disabled", "blue_flag_pickup", "red_flag_pickup"}
@@ -65,3 +72,182 @@ class InfoWriter:
 
 def _is_boolean(key: Key) -> bool:
     return (key if isinstance(key, str) else key[1]) in BOOLEAN_ENTRIES
+
+
+class VectorNormalizer:
+    """Order, sizes and bounds of a vector's entries. Methods are named as Pyquaticus' policies call them.
+
+    Args:
+        keys: names of the entries, in order.
+        sizes: how many numbers each takes.
+        low: (n,) lower bounds.
+        high: (n,) upper bounds.
+
+    ``is_angle`` (n,) tells which numbers are angles in deg: there, both bounds are one direction.
+    """
+
+    def __init__(self, keys: Sequence[Key], sizes: Sequence[int], low: Array, high: Array) -> None:
+        self.keys = tuple(keys)
+        self.sizes = tuple(sizes)
+        self.low = low
+        self.high = high
+        starts = np.cumsum([0, *self.sizes])
+        self._spans = {key: (int(starts[k]), int(starts[k + 1])) for k, key in enumerate(self.keys)}
+        self.is_angle = np.repeat([_is_angle(key) for key in self.keys], self.sizes)
+        self.normalized_space = Box(-1.0, 1.0, (len(low),), np.float32)
+        self.unnormalized_space = Box(low.astype(np.float32), high.astype(np.float32), dtype=np.float32)
+
+    @property
+    def flattened_length(self) -> int:
+        """Numbers in the vector."""
+        return len(self.low)
+
+    def flattened(self, entries: Mapping[Key, Any]) -> np.ndarray:
+        """Raw vector (n,) float32 of a dict with every entry.
+
+        Raises:
+            GameError: an entry is missing.
+        """
+        missing = [key for key in self.keys if key not in entries]
+        if missing:
+            raise GameError(f"entries are missing: {missing[:5]}; give all {len(self.keys)}")
+        return np.concatenate([np.ravel(entries[key]) for key in self.keys]).astype(np.float32)
+
+    def normalized(self, entries: Mapping[Key, Any]) -> np.ndarray:
+        """Vector (n,) float32 in [-1, 1] of a dict with every entry.
+
+        Raises:
+            GameError: an entry is missing.
+        """
+        raw = self.flattened(entries).astype(np.float64)
+        half = 0.5 * (self.high - self.low)
+        return np.clip((raw - 0.5 * (self.high + self.low)) / half, -1.0, 1.0).astype(np.float32)
+
+    def unnormalized(self, vector: Any) -> dict[Key, Any]:
+        """Entries of a normalised vector (n,); entries of one number as floats, positions as (2,) arrays.
+
+        Raises:
+            GameError: the vector has another length.
+        """
+        values = np.asarray(vector, dtype=np.float64)
+        if values.shape != self.low.shape:
+            raise GameError(f"the vector has shape {values.shape}; give {self.low.shape}")
+        raw = 0.5 * (self.high - self.low) * values + 0.5 * (self.high + self.low)
+        return self.named(raw)
+
+    def named(self, raw: Array) -> dict[Key, Any]:
+        """Entries of a raw vector (n,)."""
+        values = raw.tolist()
+        return {
+            key: values[start] if stop - start == 1 else np.array(raw[start:stop])
+            for key, (start, stop) in self._spans.items()
+        }
+
+
+def _is_angle(key: Key) -> bool:
+    return (key if isinstance(key, str) else key[1]).endswith(("bearing", "heading"))
+
+
+N_BOAT = 11
+"""Numbers per boat, before ``is_disabled``, where it is told, and obstacles."""
+
+SCRIMMAGE = 4
+"""Which of the sight lines is the dividing line."""
+
+BOAT_ENTRIES = (
+    "pos",
+    "heading",
+    "scrimmage_line_bearing",
+    "scrimmage_line_distance",
+    "speed",
+    "has_flag",
+    "on_side",
+    "oob",
+    "tagging_cooldown",
+    "is_tagged",
+)
+FLAG_ENTRIES = ("blue_flag_home", "red_flag_home", "blue_flag_pos", "red_flag_pos")
+TEAM_ENTRIES = ("blue_flag_pickup", "red_flag_pickup", "blue_team_score", "red_team_score")
+
+
+def global_state_keys(config: GameConfig) -> tuple[Key, ...]:
+    """Names of the global state's entries, in order; positions take two numbers."""
+    keys: list[Key] = []
+    for agent_id in config.agent_ids:
+        keys += [(agent_id, entry) for entry in BOAT_ENTRIES]
+        keys += [(agent_id, "is_disabled")] if config.shows_disabled else []
+        for k in range(config.n_obstacles):
+            keys += [(agent_id, f"obstacle_{k}_distance"), (agent_id, f"obstacle_{k}_bearing")]
+    return (*keys, *FLAG_ENTRIES, *TEAM_ENTRIES)
+
+
+def entry_size(key: Key) -> int:
+    """How many numbers an entry takes: 2 for positions, 1 for everything else."""
+    name = key if isinstance(key, str) else key[1]
+    return 2 if name == "pos" or name in FLAG_ENTRIES else 1
+
+
+def global_state_bounds(config: GameConfig, field: FieldGeometry, max_speed_mps: float) -> tuple[Array, Array]:
+    """Lower and upper bounds of the global state vector, each (n_global,)."""
+    buffer = 5.0 * max(config.agent_radius_m)
+    low: list[float] = []
+    high: list[float] = []
+    for key in global_state_keys(config):
+        name = key if isinstance(key, str) else key[1]
+        if entry_size(key) == 2:
+            low += [-buffer, -buffer]
+            high += list(field.size + buffer)
+            continue
+        bounds = (0.0, 1.0)
+        if name.endswith(("heading", "bearing")):
+            bounds = (-180.0, 180.0)
+        elif name.endswith("distance"):
+            bounds = (0.0, field.diagonal)
+        elif name == "speed":
+            bounds = (0.0, max_speed_mps)
+        elif name == "tagging_cooldown":
+            bounds = (0.0, config.tagging_cooldown_s)
+        elif name.endswith("score"):
+            bounds = (0.0, float(config.max_score))
+        low.append(bounds[0])
+        high.append(bounds[1])
+    return np.array(low), np.array(high)
+
+
+@lean_kernel
+def _describe_boat(rules: Rules, games: Games, b: int, i: int, out: Array) -> None:
+    state = games.state[b, i]
+    x, y, heading = state[L.X], state[L.Y], state[L.HEADING]
+    out[0] = x
+    out[1] = y
+    out[2] = heading
+    out[3], out[4] = sight_of_line(x, y, heading, rules.sight_lines[0], SCRIMMAGE)
+    out[5] = state[L.SPEED]
+    out[6] = games.has_flag[b, i]
+    out[7] = games.on_side[b, i]
+    out[8] = games.oob[b, i]
+    out[9] = games.tagging_cooldown_s[b, i]
+    out[10] = games.is_tagged[b, i]
+    at = N_BOAT
+    if rules.shows_disabled:
+        out[at] = games.is_disabled[b, i]
+        at += 1
+    for k in range(rules.obstacles.bounds.shape[0]):
+        distance, towards = distance_and_heading(rules.obstacles, k, x, y)
+        out[at + 2 * k] = distance - rules.agent_radius[i]
+        out[at + 2 * k + 1] = wrap_bearing(towards - heading)
+
+
+@lean_kernel
+def describe_game(rules: Rules, games: Games, b: int, out: Array) -> None:
+    """Raw global state of game ``b`` into ``out`` (n_global,)."""
+    width = N_BOAT + int(rules.shows_disabled) + 2 * rules.obstacles.bounds.shape[0]
+    for i in range(rules.n_boats):
+        _describe_boat(rules, games, b, i, out[i * width : (i + 1) * width])
+    at = rules.n_boats * width
+    for team in range(2):
+        for axis in range(2):
+            out[at + 2 * team + axis] = rules.flag_home[team, axis]
+            out[at + 4 + 2 * team + axis] = games.flag_position[b, team, axis]
+        out[at + 8 + team] = games.flag_taken[b, team]
+        out[at + 10 + team] = games.captures[b, team]

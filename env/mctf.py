@@ -107,7 +107,7 @@ class MctfEnv(PyquaticusAttributes, ParallelEnv[str, np.ndarray, Any]):
 
         Args:
             seed: seed of random starts; None goes on with the present random numbers.
-            options: {"init_dict": ...} starts from a partial state (see `steerclear.env.initial.start_from`).
+            options: {"init_dict": ...} starts from a partial state (see `steerclear.env.starts.start_from`).
 
         Returns:
             observations and infos by agent id.

@@ -13,9 +13,8 @@ from steerclear.shield.platforms import layout as L
 
 from .angles import heading_to, wrap_bearing
 from .arrays import Games, Rules
-from .observation_layout import OTHER_STATUS, OWN_STATUS
+from .observation_layout import OTHER_STATUS, OWN_STATUS, sight_of_line, sight_of_point
 from .obstacles import Obstacles, distance_and_heading
-from .sight import sight_of_line, sight_of_point
 
 
 @lean_kernel

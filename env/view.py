@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from steerclear.shield.exceptions import GameError
@@ -62,29 +62,8 @@ class GameView:
         return self.state[:, L.SPEED]
 
 
-_COPIED = (
-    "state",
-    "previous_position",
-    "is_tagged",
-    "is_disabled",
-    "has_flag",
-    "oob",
-    "on_side",
-    "driven",
-    "tagging_cooldown_s",
-    "made_tag",
-    "collisions",
-    "contacts",
-    "flag_position",
-    "flag_taken",
-    "captures",
-    "grabs",
-    "tags",
-    "events",
-    "power_start",
-    "power_boats",
-    "power_begun",
-)
+_FIXED = {"config", "params", "team", "flag_home", "time_s", "terminated", "truncated"}
+_COPIED = tuple(entry.name for entry in fields(GameView) if entry.name not in _FIXED)
 
 
 def view_game(config: GameConfig, rules: Rules, games: Games, b: int) -> GameView:

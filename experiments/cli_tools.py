@@ -14,8 +14,7 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
-from steerclear.env.parity import replay_trace
-from steerclear.env.parity_report import ParityReport, Tolerances
+from steerclear.env.parity import ParityReport, Tolerances, replay_trace
 from steerclear.env.record import load
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import kept_in

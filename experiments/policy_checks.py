@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from steerclear import policies
-from steerclear.env.config import GameConfig
-from steerclear.env.presets import PRESETS
+from steerclear.env.config import PRESETS, GameConfig
 from steerclear.policies.entrants.learned import learned_in
 from steerclear.policies.entrants.learned.sb3_file import check_whole
 from steerclear.policies.registry import KEYBOARD, SB3_PREFIX

@@ -13,21 +13,18 @@ os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # else importing pygam
 
 if TYPE_CHECKING:
     from steerclear.env.render.animation import save_animation, save_frame
-    from steerclear.env.render.arena import Arena
-    from steerclear.env.render.picture import Picture
-    from steerclear.env.render.renderer import MODES, Renderer
-    from steerclear.env.render.scene import Overlay, Scene
-    from steerclear.env.render.theme import THEMES
+    from steerclear.env.render.renderer import MODES, Picture, Renderer
+    from steerclear.env.render.scene import THEMES, Arena, Overlay, Scene
 
 __all__ = ["MODES", "THEMES", "Arena", "Overlay", "Picture", "Renderer", "Scene", "save_animation", "save_frame"]
 _HOME = {
     "MODES": "renderer",
     "Renderer": "renderer",
-    "THEMES": "theme",
-    "Arena": "arena",
+    "THEMES": "scene",
+    "Arena": "scene",
     "Overlay": "scene",
     "Scene": "scene",
-    "Picture": "picture",
+    "Picture": "renderer",
     "save_animation": "animation",
     "save_frame": "animation",
 }

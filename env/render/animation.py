@@ -9,10 +9,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 from steerclear.env.record_file import read_meta, validate
-from steerclear.env.render.arena import Arena
-from steerclear.env.render.picture import Picture, pixels
-from steerclear.env.render.scene import Scene
-from steerclear.env.render.theme import mix
+from steerclear.env.render.renderer import Picture, pixels
+from steerclear.env.render.scene import Arena, Scene, mix
 from steerclear.env.whole_file import whole_file
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.extras import missing

@@ -14,7 +14,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pygame
-from steerclear.env.render.theme import Colour
+from steerclear.env.render.scene import Colour
 
 OVERSAMPLE = 2
 Point = Sequence[float] | np.ndarray

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
+import os
 from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import pygame
 from steerclear.env.config import GameConfig
-from steerclear.env.render.arena import Arena
-from steerclear.env.render.picture import Picture, pixels
-from steerclear.env.render.scene import TRAIL_S, Overlay, Scene
-from steerclear.env.render.window import Window
+from steerclear.env.render.boats import draw_boats, draw_field
+from steerclear.env.render.canvas import Canvas
+from steerclear.env.render.panel import FOOTER_PX, HEADER_PX, draw_header, draw_labels, draw_legend
+from steerclear.env.render.scene import TRAIL_S, Arena, Overlay, Scene, get_theme
 from steerclear.shield.exceptions import ConfigError
 
 MODES = ("human", "rgb_array")
@@ -116,3 +119,135 @@ def _arena_of(game: GameConfig | Mapping[str, Any] | Arena) -> Arena:
     if isinstance(game, Arena):
         return game
     return Arena.from_config(game) if isinstance(game, GameConfig) else Arena.from_meta(game)
+
+
+MARGIN_PX = 24
+MIN_WIDTH_PX = 320
+MAX_WIDTH_PX = 4096
+BLOCK_PX = 16
+"""Both sides are multiples of this, because video encoders work in such blocks."""
+
+
+class Picture:
+    """Draws scenes of one arena.
+
+    Args:
+        arena: The field.
+        width_px: Width of the picture; the height follows from the field.
+        theme: "light" or "dark".
+
+    Raises:
+        ConfigError: The width or the theme cannot be used.
+    """
+
+    def __init__(self, arena: Arena, width_px: int = 1280, theme: str = "light") -> None:
+        if not MIN_WIDTH_PX <= width_px <= MAX_WIDTH_PX:
+            raise ConfigError(f"width_px is {width_px}; choose {MIN_WIDTH_PX} to {MAX_WIDTH_PX} pixels.")
+        self.arena, self.theme = arena, get_theme(theme)
+        width_px = BLOCK_PX * round(width_px / BLOCK_PX)
+        inner_px = width_px - 2 * MARGIN_PX
+        scale = min(inner_px / arena.bounds_m[0], inner_px / arena.bounds_m[1])
+        field_px = arena.bounds_m[0] * scale, arena.bounds_m[1] * scale
+        height_px = BLOCK_PX * math.ceil((HEADER_PX + field_px[1] + FOOTER_PX) / BLOCK_PX)
+        origin_px = ((width_px - field_px[0]) / 2, HEADER_PX + field_px[1])
+        self.size_px = (width_px, height_px)
+        self._canvas = Canvas(self.size_px, origin_px, scale)
+        draw_field(self._canvas, arena, self.theme)
+        self._field = self._canvas.surface.copy()
+
+    def still(self) -> pygame.Surface:
+        """Return the field alone."""
+        self._canvas.surface.blit(self._field, (0, 0))
+        return self._canvas.finished()
+
+    def draw(self, scene: Scene, show_commands: bool = True) -> pygame.Surface:
+        """Draw a moment.
+
+        Args:
+            scene: The moment.
+            show_commands: Draw wanted and sent commands, where the scene has them.
+
+        Returns:
+            A surface of ``size_px``.
+        """
+        self._canvas.surface.blit(self._field, (0, 0))
+        draw_boats(self._canvas, scene, self.arena, self.theme, show_commands)
+        surface = self._canvas.finished()
+        draw_labels(surface, self._canvas, scene, self.arena, self.theme)
+        draw_header(surface, scene, self.arena, self.theme, MARGIN_PX)
+        draw_legend(surface, self.arena, self.theme, MARGIN_PX)
+        return surface
+
+
+def pixels(surface: pygame.Surface) -> np.ndarray:
+    """Return a surface as (height, width, 3) uint8, red-green-blue."""
+    return np.ascontiguousarray(pygame.surfarray.array3d(surface).swapaxes(0, 1))
+
+
+UNSEEN = ("dummy", "offscreen")
+"""Drivers SDL falls back to where there is no display: windows open, and nobody sees them."""
+
+
+class Window:
+    """A window on the screen.
+
+    Args:
+        size_px: Width and height.
+        title: Text of the title bar.
+
+    Raises:
+        ConfigError: There is no display to open a window on.
+    """
+
+    def __init__(self, size_px: tuple[int, int], title: str) -> None:
+        try:
+            pygame.display.init()
+            if pygame.display.get_driver() in UNSEEN and "SDL_VIDEODRIVER" not in os.environ:
+                raise pygame.error("no display")
+            self._screen = pygame.display.set_mode(size_px)
+        except pygame.error as error:
+            pygame.display.quit()
+            raise ConfigError(
+                f"no window can be opened ({error}). Use render_mode='rgb_array' or save a video instead."
+            ) from error
+        pygame.display.set_caption(title)
+        self._clock = pygame.time.Clock()
+        self._keys: set[str] = set()
+        self._tapped: set[str] = set()
+        self.closed = False
+        """Whether the user has closed the window."""
+
+    def show(self, surface: pygame.Surface, frames_per_s: float | None) -> None:
+        """Show a picture, answer the window system, and wait so that frames come no faster than asked.
+
+        Args:
+            surface: The picture.
+            frames_per_s: Most pictures per second; None does not wait.
+        """
+        self._screen.blit(surface, (0, 0))
+        pygame.display.flip()
+        self.pump()
+        self._clock.tick(frames_per_s or 0)
+
+    def pump(self) -> None:
+        """Take in what the window system and the keyboard have to say."""
+        for event in pygame.event.get():
+            if event.type == pygame.QUIT:
+                self.closed = True
+            elif event.type == pygame.KEYDOWN:
+                self._keys.add(pygame.key.name(event.key))
+                self._tapped.add(pygame.key.name(event.key))
+            elif event.type == pygame.KEYUP:
+                self._keys.discard(pygame.key.name(event.key))
+            elif event.type == pygame.WINDOWFOCUSLOST:
+                self._keys.clear()
+
+    def keys(self) -> set[str]:
+        """Return the names of the keys held down, or pressed since the last call: "left", "w", "space" and so on."""
+        self.pump()
+        held, self._tapped = self._keys | self._tapped, set()
+        return held
+
+    def close(self) -> None:
+        """Close the window."""
+        pygame.display.quit()

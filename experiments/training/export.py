@@ -7,8 +7,7 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
-from steerclear.env.config import GameConfig
-from steerclear.env.presets import PRESETS
+from steerclear.env.config import PRESETS, GameConfig
 from steerclear.env.whole_file import whole_file
 from steerclear.policies.entrants.learned.network import Network
 from steerclear.policies.entrants.learned.weights_file import arrays_of

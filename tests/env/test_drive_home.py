@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
 from steerclear.env.config import GameConfig
-from steerclear.env.detour import heading_past_obstacles
-from steerclear.env.drive_home import heading_into_field
+from steerclear.env.drive_home import heading_into_field, heading_past_obstacles
 from steerclear.env.mctf import MctfEnv
 from steerclear.env.obstacles import pack_obstacles
 from steerclear.shield.platforms import layout as L

@@ -3,7 +3,7 @@ import math
 import numpy as np
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from steerclear.env.keepout import BUFFER_M, entry_point, keep_out
+from steerclear.env.motion import BUFFER_M, entry_point, keep_out
 from steerclear.shield.platforms import fresh_state, layout
 
 CENTRE = np.array([10.0, 20.0])

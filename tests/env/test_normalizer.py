@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from steerclear.env.normalizer import VectorNormalizer
+from steerclear.env.infos import VectorNormalizer
 from steerclear.shield.exceptions import GameError
 
 

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from steerclear.env.parity import compare, replay_trace
-from steerclear.env.parity_report import Tolerances
+from steerclear.env.parity import Tolerances, compare, replay_trace
 from steerclear.env.trace import load_trace
 from steerclear.shield.exceptions import TraceError
 

@@ -12,8 +12,7 @@ from steerclear.env.mctf import MctfEnv
 from steerclear.env.record import read_meta
 from steerclear.env.record_meta import meta_of
 from steerclear.env.render import THEMES, Arena, Overlay, Picture, Renderer, Scene, save_animation, save_frame
-from steerclear.env.render.picture import pixels
-from steerclear.env.render.renderer import MODES
+from steerclear.env.render.renderer import MODES, pixels
 from steerclear.shield.exceptions import ConfigError, TraceError
 
 WIDTH_PX = 640

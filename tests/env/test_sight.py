@@ -4,8 +4,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from steerclear.env.angles import heading_to, wrap_bearing
+from steerclear.env.observation_layout import pack_lines, sight_of_line, sight_of_point
 from steerclear.env.obstacles import closest_on_segment
-from steerclear.env.sight import pack_lines, sight_of_line, sight_of_point
 
 examples = settings(derandomize=True, deadline=None, max_examples=200)
 coordinate = st.floats(-200.0, 200.0)

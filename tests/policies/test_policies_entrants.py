@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from steerclear import policies
+from steerclear.env.config import PRESETS
 from steerclear.env.mctf import MctfEnv
-from steerclear.env.presets import PRESETS
 from steerclear.policies.entrants import catalogue, listing, plane
 from steerclear.policies.entrants.chao import pddl
 from steerclear.policies.entrants.chao.grid import GridProblem

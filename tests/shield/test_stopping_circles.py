@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from shield_loops import packed, step_all
-from steerclear.env.keepout import keep_out
+from steerclear.env.motion import keep_out
 from steerclear.shield import ShieldConfig, Surroundings
 from steerclear.shield.batch import BatchedShield
 from steerclear.shield.platforms import layout as L
