@@ -21,11 +21,7 @@ KINDS = ("discrete", "continuous", "afp")
 
 
 def action_kinds(config: GameConfig, kind: str | Sequence[str] | Mapping[str, str]) -> dict[str, str]:
-    """Kind of each boat's action space, from one kind, one per boat, or a dict by agent id.
-
-    Raises:
-        ConfigError: an unknown kind, a missing boat or the wrong number of entries.
-    """
+    """Kind of each boat's action space, from one kind, one per boat, or a dict by agent id."""
     if isinstance(kind, str):
         kinds = dict.fromkeys(config.agent_ids, kind)
     elif isinstance(kind, Mapping):
@@ -52,18 +48,7 @@ def action_space(kind: str, max_speed_mps: float, n_points: int) -> Space[Any]:
 
 
 def discrete_commands(indices: np.ndarray, max_speed_mps: Array) -> Array:
-    """Commands of discrete actions, many at once.
-
-    Args:
-        indices: (..., n) whole numbers 0..16.
-        max_speed_mps: (n,) top speeds, m/s.
-
-    Returns:
-        (..., n, 2) speed m/s and relative heading deg.
-
-    Raises:
-        GameError: not whole numbers, or out of range.
-    """
+    """Commands (..., n, 2), m/s and relative deg, of discrete actions (..., n) of boats of top speeds (n,), m/s."""
     try:
         given = numbers(indices)
     except NoNumbersError:
@@ -84,52 +69,33 @@ class ActionDecoder:
     Args:
         config: the game's settings.
         kinds: declared kind by agent id.
-        max_speed_mps: (n,) top speeds, m/s.
         points: named field points, name -> (x, y) m, in blue's naming.
-        size: (2,) field, m.
     """
 
-    def __init__(
-        self, config: GameConfig, kinds: dict[str, str], max_speed_mps: Array, points: dict[str, Array], size: Array
-    ) -> None:
-        self._ids = config.agent_ids
-        self._team_size = config.team_size
-        self._radius_m = config.agent_radius_m
-        self._kinds = kinds
-        self._max_speed_mps = max_speed_mps
-        self._points = points
+    def __init__(self, config: GameConfig, kinds: dict[str, str], points: dict[str, Array]) -> None:
+        self._config, self._kinds, self._points = config, kinds, points
         self._names = tuple(points)
-        self._size = size
 
     def decode(self, actions: Mapping[str, Any], state: Array) -> Array:
-        """Commands (n, 2) of all boats; a boat without an action stops.
-
-        Args:
-            actions: agent id -> action.
-            state: (n, N_STATE) the boats' state rows.
-
-        Raises:
-            GameError: not a mapping, an unknown agent or an action that is none.
-        """
-        check_agents(actions, self._ids)
-        commands = np.zeros((len(self._ids), 2))
-        for i, agent_id in enumerate(self._ids):
+        """Commands (n, 2) of agent ids' actions for boats at ``state`` (n, N_STATE); a boat without an action stops."""
+        ids = self._config.agent_ids
+        check_agents(actions, ids)
+        commands = np.zeros((len(ids), 2))
+        for i, agent_id in enumerate(ids):
             if agent_id in actions:
                 commands[i] = read_action(self._seat(agent_id, i, state[i]), actions[agent_id])
         return commands
 
     def _seat(self, agent_id: str, i: int, state: Array) -> Seat:
-        return Seat(
-            agent_id,
-            float(self._max_speed_mps[i]),
-            lambda name: self._to_point(i, name, state),
-            self._names,
-            numbered=self._kinds[agent_id] == "afp",
-        )
+        top_mps = float(self._config.platforms[i].max_speed_mps)
 
-    def _to_point(self, i: int, name: str, state: Array) -> Command:
-        """Full speed towards a named point (mirrored for red), stopping within the boat's own radius of it."""
-        point = self._points[name] if i < self._team_size else self._size - self._points[name]
-        dx, dy = point[0] - state[L.X], point[1] - state[L.Y]
-        speed = 0.0 if np.hypot(dx, dy) <= self._radius_m[i] else float(self._max_speed_mps[i])
-        return speed, wrap_bearing(heading_to(dx, dy) - state[L.HEADING])
+        def to_point(name: str) -> Command:
+            """Full speed towards a named point (mirrored for red), stopping within the boat's own radius of it."""
+            point = self._points[name]
+            if i >= self._config.team_size:
+                point = np.array(self._config.env_bounds_m) - point
+            dx, dy = point[0] - state[L.X], point[1] - state[L.Y]
+            speed = 0.0 if np.hypot(dx, dy) <= self._config.agent_radius_m[i] else top_mps
+            return speed, wrap_bearing(heading_to(dx, dy) - state[L.HEADING])
+
+        return Seat(agent_id, top_mps, to_point, self._names, numbered=self._kinds[agent_id] == "afp")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from steerclear.shield.jit import Array, lean_kernel
 
 from . import rules as R
@@ -14,16 +12,6 @@ from .rules import check_collisions, look_for_contacts
 
 CHUNK = 64
 """Games handled together, rule by rule."""
-
-
-@lean_kernel
-def first_unusable(commands: Array) -> int:
-    """Flat number ``b * n + i`` of the first command (B, n, 2) that is not finite, or -1."""
-    for b in range(commands.shape[0]):
-        for i in range(commands.shape[1]):
-            if not (math.isfinite(commands[b, i, 0]) and math.isfinite(commands[b, i, 1])):
-                return b * commands.shape[1] + i
-    return -1
 
 
 @lean_kernel
@@ -66,12 +54,10 @@ def end_decision(rules: Rules, games: Games) -> None:
 
 @lean_kernel
 def advance_games(rules: Rules, games: Games, wanted: Array, commands: Array) -> None:
-    """Move all boats for a decision, after `begin_decision`, and apply the rules.
+    """Move all boats for a decision, after `begin_decision`, and apply the rules, over chunks that fit into the cache.
 
-    The first step is made under ``commands`` (B, n, 2), speed m/s and relative heading deg; in each later one the game
-    decides anew for the boats it drives, and the others obey ``wanted``. ``commands`` is used up.
-
-    Games do not touch each other, so each rule runs over a chunk of games that fits into the cache.
+    The first step is made under ``commands`` (B, n, 2), which is used up; in later ones the game decides anew for the
+    boats it drives, and the others obey ``wanted``.
     """
     n_games = games.state.shape[0]
     for first in range(0, n_games, CHUNK):

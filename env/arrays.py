@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple, get_args, get_type_hints
 
 import numpy as np
+from numpy.typing import NDArray
 from steerclear.shield.jit import Array, BoolArray, IntArray
-from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms.layout import N_STATE
 from steerclear.shield.shared import share
 
@@ -59,40 +59,40 @@ class Rules(NamedTuple):
 
 
 class Games(NamedTuple):
-    """State of B games of n boats; teams are 0 (blue) and 1 (red). Every array is changed in place.
+    """State of B games of n boats; teams are 0 (blue) and 1 (red). Every array (B, ...) is changed in place.
 
     ``state`` rows are laid out as in `steerclear.shield.platforms.layout`.
     """
 
-    state: Array  # (B, n, N_STATE)
-    previous_position: Array  # (B, n, 2) m, before the last move
-    error_is_float32: BoolArray  # (B, n) the heading controller's memory came in single precision
-    is_tagged: BoolArray  # (B, n)
-    is_disabled: BoolArray  # (B, n) stopped by a power play
-    has_flag: BoolArray  # (B, n)
-    oob: BoolArray  # (B, n)
-    on_side: BoolArray  # (B, n)
-    driven: BoolArray  # (B, n) the game, not the policy, decides the command
-    tagging_cooldown_s: Array  # (B, n) s since the last tag, up to the cool-down
-    made_tag: IntArray  # (B, n) boat tagged in this step, -1 for none
-    collisions: IntArray  # (B, n) collisions so far, one per entry per pair
-    touching: BoolArray  # (B, n, n) pairs within the sum of their radii
-    new_collisions: IntArray  # (B, n) collisions begun in this decision
-    contacts: IntArray  # (B, n) the same as ``collisions``, looked for after every step: what really happened
-    contact: BoolArray  # (B, n, n) pairs within touch after the last step
-    power_start: IntArray  # (B, 2) decision at which a team's power play begins, -1 for none
-    power_boats: IntArray  # (B, 2, 2) boats it disables: the first, and one more if it begins twice, see `power_play`
-    power_begun: IntArray  # (B, 2) how often it began
-    flag_position: Array  # (B, 2, 2) m
-    flag_taken: BoolArray  # (B, 2) the flag of that team is carried by an opponent
-    captures: IntArray  # (B, 2)
-    grabs: IntArray  # (B, 2)
-    tags: IntArray  # (B, 2)
-    events: IntArray  # (B, 2, 4) captures, grabs, tags made and boats gone out of bounds in this step
-    time_s: Array  # (B,)
-    terminated: BoolArray  # (B,) a team reached max_score
-    truncated: BoolArray  # (B,) time is up
-    rng: np.ndarray  # (B,) uint64 state of each game's random numbers
+    state: Annotated[Array, "n", N_STATE]
+    previous_position: Annotated[Array, "n", 2]  # m, before the last move
+    error_is_float32: Annotated[BoolArray, "n"]  # the heading controller's memory came in single precision
+    is_tagged: Annotated[BoolArray, "n"]
+    is_disabled: Annotated[BoolArray, "n"]  # stopped by a power play
+    has_flag: Annotated[BoolArray, "n"]
+    oob: Annotated[BoolArray, "n"]  # out of bounds
+    on_side: Annotated[BoolArray, "n"]
+    driven: Annotated[BoolArray, "n"]  # the game, not the policy, decides the command
+    tagging_cooldown_s: Annotated[Array, "n"]  # s since the last tag, up to the cool-down
+    made_tag: Annotated[IntArray, "n"]  # boat tagged in this step, -1 for none
+    collisions: Annotated[IntArray, "n"]  # collisions so far, one per entry per pair
+    touching: Annotated[BoolArray, "n", "n"]  # pairs within the sum of their radii
+    new_collisions: Annotated[IntArray, "n"]  # collisions begun in this decision
+    contacts: Annotated[IntArray, "n"]  # as ``collisions``, looked for after every step: what really happened
+    contact: Annotated[BoolArray, "n", "n"]  # pairs within touch after the last step
+    power_start: Annotated[IntArray, 2]  # decision at which a team's power play begins, -1 for none
+    power_boats: Annotated[IntArray, 2, 2]  # boats it disables: the first, and one more if it begins twice
+    power_begun: Annotated[IntArray, 2]  # how often it began
+    flag_position: Annotated[Array, 2, 2]  # m
+    flag_taken: Annotated[BoolArray, 2]  # the flag of that team is carried by an opponent
+    captures: Annotated[IntArray, 2]
+    grabs: Annotated[IntArray, 2]
+    tags: Annotated[IntArray, 2]
+    events: Annotated[IntArray, 2, 4]  # captures, grabs, tags made and boats gone out of bounds in this decision
+    time_s: Annotated[Array, ()]
+    terminated: Annotated[BoolArray, ()]  # a team reached max_score
+    truncated: Annotated[BoolArray, ()]  # time is up
+    rng: Annotated[NDArray[np.uint64], ()]  # state of each game's random numbers
 
 
 CAPTURE, GRAB, TAG, OUT = 0, 1, 2, 3
@@ -101,93 +101,40 @@ CAPTURE, GRAB, TAG, OUT = 0, 1, 2, 3
 
 def make_rules(config: GameConfig, field: FieldGeometry) -> Rules:
     """Pack a config and its field for compiled code."""
-    platforms = [get_platform(name) for name in config.platforms]
-    reward = config.reward
-    return share(
-        Rules(
-            n_boats=config.n_boats,
-            team_size=config.team_size,
-            dt_s=config.dt_s,
-            decision_steps=config.decision_steps,
-            decision_s=config.decision_s,
-            max_time_s=config.max_time_s,
-            max_score=config.max_score,
-            agent_radius=np.array(config.agent_radius_m, dtype=np.float64),
-            catch_radius=config.catch_radius_m,
-            flag_keepout=config.flag_keepout_m,
-            cooldown=config.tagging_cooldown_s,
-            oob_speed_frac=config.oob_speed_frac,
-            tag_on_oob=config.tag_on_oob,
-            tag_on_collision=config.tag_on_collision,
-            capture_at_base=config.capture_at == "own_base",
-            capture_at_corner=config.capture_at == "own_corners",
-            untag_at_corner=config.untag_at == "own_corners",
-            corner_radius=config.corner_radius_m,
-            corners=own_corners(field.size, 0.0),
-            corner_marks=own_corners(field.size, CORNER_INSET_M),
-            tag_speed_frac=config.tag_speed_frac,
-            tag_probability=config.tag_probability,
-            max_cycles=math.ceil(config.max_time_s / config.decision_s),
-            power_length=math.ceil(config.max_time_s / config.decision_s) * config.power_play_share,
-            shows_disabled=config.shows_disabled,
-            size=field.size,
-            flag_home=field.flag_home,
-            scrimmage=field.scrimmage,
-            sight_lines=np.stack([pack_lines(np.concatenate([walls, [field.scrimmage]])) for walls in field.walls]),
-            side_sign=field.side_sign,
-            slots=boat_slots(config),
-            team=np.repeat(np.array([0, 1], dtype=np.int64), config.team_size),
-            params=np.stack([platform.pack() for platform in platforms]),
-            max_speed=np.array([platform.max_speed_mps for platform in platforms]),
-            obstacles=pack_obstacles(config.obstacles),
-            reward=np.array([reward.capture, reward.grab, reward.tag, -reward.oob, -reward.collision]),
-        )
-    )
+    reward, decisions = config.reward, math.ceil(config.max_time_s / config.decision_s)
+    same = {name: getattr(config, name) for name in Rules._fields if hasattr(config, name)}
+    packed = {
+        "agent_radius": np.array(config.agent_radius_m, dtype=np.float64),
+        "catch_radius": config.catch_radius_m,
+        "flag_keepout": config.flag_keepout_m,
+        "cooldown": config.tagging_cooldown_s,
+        "capture_at_base": config.capture_at == "own_base",
+        "capture_at_corner": config.capture_at == "own_corners",
+        "untag_at_corner": config.untag_at == "own_corners",
+        "corner_radius": config.corner_radius_m,
+        "corners": own_corners(field.size, 0.0),
+        "corner_marks": own_corners(field.size, CORNER_INSET_M),
+        "max_cycles": decisions,
+        "power_length": decisions * config.power_play_share,
+        "size": field.size,
+        "flag_home": field.flag_home,
+        "scrimmage": field.scrimmage,
+        "sight_lines": np.stack([pack_lines(np.concatenate([walls, [field.scrimmage]])) for walls in field.walls]),
+        "side_sign": field.side_sign,
+        "slots": boat_slots(config),
+        "team": np.repeat(np.array([0, 1], dtype=np.int64), config.team_size),
+        "params": np.stack([platform.pack() for platform in config.platforms]),
+        "max_speed": np.array([platform.max_speed_mps for platform in config.platforms]),
+        "obstacles": pack_obstacles(config.obstacles),
+        "reward": np.array([reward.capture, reward.grab, reward.tag, -reward.oob, -reward.collision]),
+    }
+    return share(Rules(**(same | packed)))
 
 
 def make_games(config: GameConfig, n_games: int) -> Games:
     """Arrays for ``n_games`` games, zero; `starts` fills them."""
-    n = config.n_boats
-
-    def booleans(*shape: int) -> BoolArray:
-        return np.zeros((n_games, *shape), dtype=np.bool_)
-
-    def counts(*shape: int) -> IntArray:
-        return np.zeros((n_games, *shape), dtype=np.int64)
-
-    def reals(*shape: int) -> Array:
-        return np.zeros((n_games, *shape))
-
-    return share(
-        Games(
-            state=reals(n, N_STATE),
-            previous_position=reals(n, 2),
-            error_is_float32=booleans(n),
-            is_tagged=booleans(n),
-            is_disabled=booleans(n),
-            has_flag=booleans(n),
-            oob=booleans(n),
-            on_side=booleans(n),
-            driven=booleans(n),
-            tagging_cooldown_s=reals(n),
-            made_tag=counts(n),
-            collisions=counts(n),
-            touching=booleans(n, n),
-            new_collisions=counts(n),
-            contacts=counts(n),
-            contact=booleans(n, n),
-            power_start=counts(2),
-            power_boats=counts(2, 2),
-            power_begun=counts(2),
-            flag_position=reals(2, 2),
-            flag_taken=booleans(2),
-            captures=counts(2),
-            grabs=counts(2),
-            tags=counts(2),
-            events=counts(2, 4),
-            time_s=np.zeros(n_games),
-            terminated=np.zeros(n_games, dtype=np.bool_),
-            truncated=np.zeros(n_games, dtype=np.bool_),
-            rng=np.zeros(n_games, dtype=np.uint64),
-        )
-    )
+    arrays = {}
+    for name, kind in get_type_hints(Games, include_extras=True).items():
+        axes = [config.n_boats if axis == "n" else axis for axis in kind.__metadata__ if axis != ()]
+        arrays[name] = np.zeros((n_games, *axes), dtype=get_args(get_args(kind.__origin__)[1])[0])
+    return share(Games(**arrays))

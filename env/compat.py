@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Generic, TypeVar
 
@@ -48,14 +49,18 @@ class TeamMap(Mapping[Any, V], Generic[V]):
         return 2
 
 
-class Player:
-    """One boat of a running game; every property is read from the game when asked for.
+def _live(name: str, kind: Callable[[Any], Any], doc: str) -> Any:
+    """A property that reads an array of game 0 when it is asked for, of the boat or team ``idx``."""
+    return property(lambda self: kind(getattr(self._core, name)[0, self.idx]), doc=doc)
 
-    Attributes:
-        id: agent id.
-        idx: number of the boat.
-        team: its `Team`.
-    """
+
+def _moving(column: int, doc: str) -> Any:
+    """A property that reads a column of a boat's state."""
+    return property(lambda self: float(self._core.state[0, self.idx, column]), doc=doc)
+
+
+class Player:
+    """One boat of a running game: agent ``id``, its number ``idx`` and `Team`; properties are read when asked for."""
 
     def __init__(self, core: BatchedMctf, idx: int) -> None:
         self._core = core
@@ -63,55 +68,16 @@ class Player:
         self.idx = idx
         self.team = Team(int(core.team[idx]))
 
-    @property
-    def pos(self) -> Array:
-        """Position (2,), m."""
-        return np.array(self._core.state[0, self.idx, [L.X, L.Y]])
-
-    @property
-    def prev_pos(self) -> Array:
-        """Position before the last move (2,), m."""
-        return np.array(self._core.previous_position[0, self.idx])
-
-    @property
-    def heading(self) -> float:
-        """Heading, deg clockwise from north."""
-        return float(self._core.state[0, self.idx, L.HEADING])
-
-    @property
-    def speed(self) -> float:
-        """Speed, m/s."""
-        return float(self._core.state[0, self.idx, L.SPEED])
-
-    @property
-    def has_flag(self) -> bool:
-        """Whether it carries the opponents' flag."""
-        return bool(self._core.has_flag[0, self.idx])
-
-    @property
-    def is_tagged(self) -> bool:
-        """Whether it is tagged."""
-        return bool(self._core.is_tagged[0, self.idx])
-
-    @property
-    def is_disabled(self) -> bool:
-        """Whether a power play has it stopped."""
-        return bool(self._core.is_disabled[0, self.idx])
-
-    @property
-    def oob(self) -> bool:
-        """Whether it is out of bounds."""
-        return bool(self._core.oob[0, self.idx])
-
-    @property
-    def on_own_side(self) -> bool:
-        """Whether it was on its own side when the last step began."""
-        return bool(self._core.on_side[0, self.idx])
-
-    @property
-    def tagging_cooldown(self) -> float:
-        """Time since its last tag, s, up to the cool-down."""
-        return float(self._core.tagging_cooldown_s[0, self.idx])
+    pos = _live("state", lambda row: np.array(row[[L.X, L.Y]]), "Position (2,), m.")
+    prev_pos = _live("previous_position", np.array, "Position before the last move (2,), m.")
+    heading = _moving(L.HEADING, "Heading, deg clockwise from north.")
+    speed = _moving(L.SPEED, "Speed, m/s.")
+    has_flag = _live("has_flag", bool, "Whether it carries the opponents' flag.")
+    is_tagged = _live("is_tagged", bool, "Whether it is tagged.")
+    is_disabled = _live("is_disabled", bool, "Whether a power play has it stopped.")
+    oob = _live("oob", bool, "Whether it is out of bounds.")
+    on_own_side = _live("on_side", bool, "Whether it was on its own side when the last step began.")
+    tagging_cooldown = _live("tagging_cooldown_s", float, "Time since its last tag, s, up to the cool-down.")
 
     def get_max_speed(self) -> float:
         """Top speed, m/s."""
@@ -122,38 +88,47 @@ class Flag:
     """One team's flag in a running game."""
 
     def __init__(self, core: BatchedMctf, team: Team) -> None:
-        self._core = core
-        self.team = team
+        self._core, self.team, self.idx = core, team, int(team)
 
-    @property
-    def home(self) -> Array:
-        """Its home (2,), m."""
-        return np.array(self._core.flag_home[int(self.team)])
-
-    @property
-    def pos(self) -> Array:
-        """Where it is (2,), m."""
-        return np.array(self._core.flag_position[0, int(self.team)])
-
-    @property
-    def taken(self) -> bool:
-        """Whether an opponent carries it."""
-        return bool(self._core.flag_taken[0, int(self.team)])
+    home = property(lambda self: np.array(self._core.flag_home[self.idx]), doc="Its home (2,), m.")
+    pos = _live("flag_position", np.array, "Where it is (2,), m.")
+    taken = _live("flag_taken", bool, "Whether an opponent carries it.")
 
 
+@dataclass
 class CircleObstacle:
-    """A circle in the water."""
+    """A circle in the water, m."""
 
-    def __init__(self, radius: float, center_point: tuple[float, float]) -> None:
-        self.radius = radius
-        self.center_point = center_point
+    radius: float
+    center_point: tuple[float, float]
 
 
+@dataclass
 class PolygonObstacle:
-    """A polygon in the water."""
+    """A polygon in the water, m."""
 
-    def __init__(self, anchor_points: list[tuple[float, float]]) -> None:
-        self.anchor_points = anchor_points
+    anchor_points: list[tuple[float, float]]
+
+
+_SETTINGS = {
+    "team_size": "team_size",
+    "dt": "dt_s",
+    "sim_speedup_factor": "decision_steps",
+    "tag_speed_frac": "tag_speed_frac",
+    "tag_probability": "tag_probability",
+    "untag_radius": "corner_radius_m",
+    "power_play_percentage": "power_play_share",
+    "catch_radius": "catch_radius_m",
+    "flag_radius": "flag_radius_m",
+    "flag_keepout_radius": "flag_keepout_m",
+    "tagging_cooldown": "tagging_cooldown_s",
+    "max_score": "max_score",
+    "max_time": "max_time_s",
+    "oob_speed_frac": "oob_speed_frac",
+    "tag_on_oob": "tag_on_oob",
+    "tag_on_collision": "tag_on_collision",
+}
+"""Pyquaticus' attribute -> our setting, where they are the same."""
 
 
 class PyquaticusAttributes:
@@ -183,29 +158,11 @@ class PyquaticusAttributes:
         self.env_bounds = np.array([[0.0, 0.0], field.size])
         self.env_diag = field.diagonal
         self.max_speeds = core.max_speed_mps.tolist()
-        self._set_pyquaticus_numbers()
-
-    def _set_pyquaticus_numbers(self) -> None:
-        config = self.core.config
         self.gps_env = False
-        self.team_size = config.team_size
-        self.dt = config.dt_s
-        self.sim_speedup_factor = config.decision_steps
-        self.tag_speed_frac = config.tag_speed_frac
-        self.tag_probability = config.tag_probability
-        self.untag_radius = config.corner_radius_m
-        self.power_play_percentage = config.power_play_share
-        self.blue_untag_coords, self.red_untag_coords = self.core.rules.corner_marks.tolist()
         self.agent_radius = np.array(config.agent_radius_m)
-        self.catch_radius = config.catch_radius_m
-        self.flag_radius = config.flag_radius_m
-        self.flag_keepout_radius = config.flag_keepout_m
-        self.tagging_cooldown = config.tagging_cooldown_s
-        self.max_score = config.max_score
-        self.max_time = config.max_time_s
-        self.oob_speed_frac = config.oob_speed_frac
-        self.tag_on_oob = config.tag_on_oob
-        self.tag_on_collision = config.tag_on_collision
+        self.blue_untag_coords, self.red_untag_coords = core.rules.corner_marks.tolist()
+        for theirs, ours in _SETTINGS.items():
+            setattr(self, theirs, getattr(config, ours))
 
     @property
     def current_time(self) -> float:
@@ -217,13 +174,14 @@ class PyquaticusAttributes:
         """Scores, grabs, tags and collisions so far, by team."""
         if self.core.n_games != 1:
             raise GameError("game_events belongs to a single game; read the arrays of BatchedMctf instead")
-        return TeamMap(self._events_of(0), self._events_of(1))
-
-    def _events_of(self, team: int) -> dict[str, int]:
         core = self.core
-        return {
-            "scores": int(core.captures[0, team]),
-            "grabs": int(core.grabs[0, team]),
-            "tags": int(core.tags[0, team]),
-            "collisions": int(core.collisions[0, core.team == team].sum()),
-        }
+        blue, red = (
+            {
+                "scores": int(core.captures[0, team]),
+                "grabs": int(core.grabs[0, team]),
+                "tags": int(core.tags[0, team]),
+                "collisions": int(core.collisions[0, core.team == team].sum()),
+            }
+            for team in (0, 1)
+        )
+        return TeamMap(blue, red)

@@ -14,42 +14,45 @@ from steerclear.shield.platforms import Platform, get_platform
 
 from .validation import (
     check_choice,
-    check_circles,
     check_count,
+    check_obstacles,
     check_point,
-    check_polygons,
     check_real,
     check_segment,
     per_boat,
 )
 
 Point = tuple[float, float]
-PolygonPoints = tuple[Point, ...]
-CircleSpec = tuple[float, Point]
 
 CAPTURE_AT = ("own_side", "own_base", "own_corners")
 UNTAG_AT = ("own_flag", "own_corners")
 
-MOST_STEPS = 1000
-"""Steps of a decision at most; a slip of the pen would make one last for hours."""
-
-MOST_BOATS = 1000
-"""Boats of a team at most."""
-
-_NOT_NEGATIVE = (
-    "flag_keepout_m",
-    "flag_radius_m",
-    "tagging_cooldown_s",
-    "oob_speed_frac",
-    "tag_speed_frac",
-    "tag_probability",
-    "power_play_share",
-)
-_HIGHEST = {"tag_probability": 1.0, "power_play_share": 0.5}
-"""Of those that have an end; two power plays of more than half a game would not be apart."""
+MOST_STEPS, MOST_BOATS = 1000, 1000
+"""Steps of a decision and boats of a team at most; a slip of the pen would make one last for hours."""
 
 LONGEST_S = 1e7
 """Games are at most this long, s: four months, far beyond any; a slip of the pen would never end."""
+
+_YES_OR_NO = ("tag_on_oob", "tag_on_collision", "default_start", "on_side_start", "shows_disabled")
+_COUNTS = {"team_size": MOST_BOATS, "max_score": None, "decision_steps": MOST_STEPS}
+_CHOICES: dict[str, tuple[Any, ...]] = {
+    **dict.fromkeys(
+        ("tag_on_oob", "tag_on_collision", "default_start", "on_side_start", "shows_disabled"), (True, False)
+    ),
+    "capture_at": CAPTURE_AT,
+    "untag_at": UNTAG_AT,
+}
+_POSITIVE = {"dt_s": None, "catch_radius_m": None, "corner_radius_m": None, "max_time_s": LONGEST_S}
+_NOT_NEGATIVE = {
+    "flag_keepout_m": None,
+    "flag_radius_m": None,
+    "tagging_cooldown_s": None,
+    "oob_speed_frac": None,
+    "tag_speed_frac": None,
+    "tag_probability": 1.0,
+    "power_play_share": 0.5,  # two of more than half a game would not be apart
+}
+"""Numbers, and how high they may be."""
 
 
 @dataclass(frozen=True)
@@ -150,38 +153,18 @@ class GameConfig:
     preset_name: str = "custom"
 
     def __post_init__(self) -> None:
-        if check_count("team_size", self.team_size, low=1) > MOST_BOATS:
-            raise ConfigError(f"team_size is {self.team_size}; give at most {MOST_BOATS} boats")
-        check_count("max_score", self.max_score, low=1)
-        if check_count("decision_steps", self.decision_steps, low=1) > MOST_STEPS:
-            raise ConfigError(f"decision_steps is {self.decision_steps}; give at most {MOST_STEPS}")
-        self._check_numbers()
-        for name in ("tag_on_oob", "tag_on_collision", "default_start", "on_side_start", "shows_disabled"):
-            check_choice(name, getattr(self, name), (True, False))
-        check_choice("capture_at", self.capture_at, CAPTURE_AT)
-        check_choice("untag_at", self.untag_at, UNTAG_AT)
+        for name, most in _COUNTS.items():
+            check_count(name, getattr(self, name), 1, most)
+        for name, high in _POSITIVE.items():
+            self._set(name, check_real(name, getattr(self, name), above=0.0, high=high))
+        for name, high in _NOT_NEGATIVE.items():
+            self._set(name, check_real(name, getattr(self, name), low=0.0, high=high))
+        for name, choices in _CHOICES.items():
+            check_choice(name, getattr(self, name), choices)
         if not isinstance(self.preset_name, str):
             raise ConfigError(f"preset_name is {self.preset_name!r}; give a text")
         if not isinstance(self.reward, RewardWeights):
             raise ConfigError(f"reward is {self.reward!r}; give a RewardWeights(...)")
-        self._set_geometry()
-        boats = self.n_boats
-        platforms = per_boat("platforms", self.platforms, boats, (str, Platform))
-        self._set("platforms", tuple(get_platform(p) for p in platforms))
-        radii = per_boat("agent_radius_m", self.agent_radius_m, boats, (int, float))
-        self._set("agent_radius_m", tuple(check_real("agent_radius_m", r, above=0.0) for r in radii))
-
-    def _set(self, name: str, value: Any) -> None:
-        object.__setattr__(self, name, value)
-
-    def _check_numbers(self) -> None:
-        for name in ("dt_s", "catch_radius_m", "corner_radius_m"):
-            self._set(name, check_real(name, getattr(self, name), above=0.0))
-        self._set("max_time_s", check_real("max_time_s", self.max_time_s, above=0.0, high=LONGEST_S))
-        for name in _NOT_NEGATIVE:
-            self._set(name, check_real(name, getattr(self, name), low=0.0, high=_HIGHEST.get(name)))
-
-    def _set_geometry(self) -> None:
         width, height = check_point("env_bounds_m", self.env_bounds_m)
         check_real("env_bounds_m width", width, above=0.0)
         check_real("env_bounds_m height", height, above=0.0)
@@ -193,17 +176,14 @@ class GameConfig:
             raise ConfigError("give both blue_flag_home_m and red_flag_home_m, or neither")
         if self.scrimmage_m is not None:
             self._set("scrimmage_m", check_segment("scrimmage_m", self.scrimmage_m))
-        self._set_obstacles()
+        self._set("obstacles", check_obstacles(self.obstacles))
+        platforms = per_boat("platforms", self.platforms, self.n_boats, (str, Platform))
+        self._set("platforms", tuple(get_platform(p) for p in platforms))
+        radii = per_boat("agent_radius_m", self.agent_radius_m, self.n_boats, (int, float))
+        self._set("agent_radius_m", tuple(check_real("agent_radius_m", r, above=0.0) for r in radii))
 
-    def _set_obstacles(self) -> None:
-        if self.obstacles is None:
-            self._set("obstacles", {"circle": (), "polygon": ()})
-            return
-        if not isinstance(self.obstacles, Mapping) or set(self.obstacles) - {"circle", "polygon"}:
-            raise ConfigError(f"obstacles is {self.obstacles!r}; give a dict with the keys 'circle' and 'polygon' only")
-        circles = check_circles(self.obstacles.get("circle") or ())
-        polygons = check_polygons(self.obstacles.get("polygon") or ())
-        self._set("obstacles", {"circle": circles, "polygon": polygons})
+    def _set(self, name: str, value: Any) -> None:
+        object.__setattr__(self, name, value)
 
     @property
     def decision_s(self) -> float:

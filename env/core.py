@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from steerclear.shield.arrays import NoNumbersError, numbers
@@ -13,20 +13,12 @@ from steerclear.shield.jit import Array, BoolArray, IntArray
 from steerclear.shield.shared import share
 from steerclear.shield.workspace import LARGEST_COMMAND
 
-from .advance import (
-    CHUNK,
-    advance_games,
-    begin_decision,
-    end_decision,
-    first_unusable,
-    follow_games,
-    move_games,
-)
+from .advance import CHUNK, advance_games, begin_decision, end_decision, follow_games, move_games
 from .arrays import make_games, make_rules
 from .config import GameConfig, as_config
 from .drive_home import decide_commands
 from .field import field_geometry
-from .observation_layout import observation_bounds, observation_keys
+from .observation_layout import bounds_of, observation_keys
 from .observe import observe_games
 from .power_play import toggle_power_plays
 from .randomness import seed_states
@@ -45,17 +37,10 @@ It is asked before every step of motion: several times a decision where a comman
 class BatchedMctf:
     """B games of Maritime Capture the Flag, stepped together without Python in the loop.
 
-    Boats are ordered agent_0..: blue (team 0) first, then red (team 1). All arrays are attributes and live: they
-    are changed in place by `step` and `reset`. With n boats:
-
-    ``state (B, n, N_STATE)`` (columns in `steerclear.shield.platforms.layout`), ``params (n, N_PARAM)``,
-    ``team (n,)``, ``is_tagged, is_disabled, has_flag, oob, on_side,
-    driven (B, n)`` bool, ``tagging_cooldown_s (B, n)`` s since
-    the last tag, ``flag_home (2, 2)`` m, ``flag_position (B, 2, 2)`` m, ``flag_taken (B, 2)``,
-    ``captures, grabs, tags (B, 2)``, ``events (B, 2, 4)`` captures, grabs, tags and boats gone out of bounds in the
-    last decision, ``made_tag (B, n)``, ``collisions, new_collisions (B, n)``, ``touching (B, n, n)``, ``contacts
-    (B, n)`` collisions looked for after every step, ``power_start (B, 2)`` decision at which a team's power play begins
-    (-1: none), ``time_s (B,)``, ``terminated, truncated (B,)``, ``previous_position (B, n, 2)``.
+    Boats are ordered agent_0..: blue (team 0) first, then red (team 1). The arrays of `Games`, such as ``state
+    (B, n, N_STATE)``, ``is_tagged (B, n)`` or ``time_s (B,)``, are attributes and live: `step` and `reset` change them
+    in place. So are those of n boats ``params (n, N_PARAM)``, ``team``, ``max_speed_mps``, ``agent_radius_m (n,)`` and
+    ``flag_home (2, 2)`` m.
 
     A finished game goes on when stepped; reset it with `reset(mask)`.
 
@@ -75,10 +60,15 @@ class BatchedMctf:
         self.field = field_geometry(self.config)
         self.rules = make_rules(self.config, self.field)
         self.games = make_games(self.config, self.n_games)
-        self._bind_arrays()
+        vars(self).update(self.games._asdict())
+        self.params: Array = self.rules.params
+        self.team: IntArray = self.rules.team
+        self.max_speed_mps: Array = self.rules.max_speed
+        self.agent_radius_m: Array = self.rules.agent_radius
+        self.flag_home: Array = self.rules.flag_home
         self.observation_keys = observation_keys(self.config)
         self.n_obs = len(self.observation_keys)
-        low, high = observation_bounds(self.config, self.field, float(self.max_speed_mps.max()))
+        low, high = bounds_of(self.observation_keys, self.config, self.field, float(self.max_speed_mps.max()))
         self.observation_low, self.observation_high = low, high
         self._middle = 0.5 * (low + high)
         self._scale = 2.0 / np.where(high > low, high - low, np.inf)
@@ -90,38 +80,10 @@ class BatchedMctf:
         self.seed(seed)
         self.reset()
 
-    def _bind_arrays(self) -> None:
-        """Attributes are the very arrays compiled code works on."""
-        games, rules = self.games, self.rules
-        self.params: Array = rules.params
-        self.team: IntArray = rules.team
-        self.max_speed_mps: Array = rules.max_speed
-        self.agent_radius_m: Array = rules.agent_radius
-        self.flag_home: Array = rules.flag_home
-        self.state: Array = games.state
-        self.previous_position: Array = games.previous_position
-        self.is_tagged: BoolArray = games.is_tagged
-        self.is_disabled: BoolArray = games.is_disabled
-        self.contacts: IntArray = games.contacts
-        self.power_start: IntArray = games.power_start
-        self.has_flag: BoolArray = games.has_flag
-        self.oob: BoolArray = games.oob
-        self.on_side: BoolArray = games.on_side
-        self.driven: BoolArray = games.driven
-        self.tagging_cooldown_s: Array = games.tagging_cooldown_s
-        self.made_tag: IntArray = games.made_tag
-        self.collisions: IntArray = games.collisions
-        self.new_collisions: IntArray = games.new_collisions
-        self.touching: BoolArray = games.touching
-        self.flag_position: Array = games.flag_position
-        self.flag_taken: BoolArray = games.flag_taken
-        self.captures: IntArray = games.captures
-        self.grabs: IntArray = games.grabs
-        self.tags: IntArray = games.tags
-        self.events: IntArray = games.events
-        self.time_s: Array = games.time_s
-        self.terminated: BoolArray = games.terminated
-        self.truncated: BoolArray = games.truncated
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            """Arrays of `Games`."""
 
     def reset(self, mask: BoolArray | None = None, seed: int | None = None) -> np.ndarray:
         """Start games anew.
@@ -176,9 +138,8 @@ class BatchedMctf:
         Raises:
             GameError: wrong shape, or an action is not finite or beyond `LARGEST_COMMAND`.
         """
-        wanted = self._checked("actions", actions)
         decided = np.empty_like(self._commands)
-        self._refuse("action", decide_commands(self.rules, self.games, wanted, decided))
+        decide_commands(self.rules, self.games, self._checked("action", actions), decided)
         return decided
 
     def advance(self, commands: Array) -> None:
@@ -190,14 +151,10 @@ class BatchedMctf:
         Raises:
             GameError: wrong shape, or a command is not finite or beyond `LARGEST_COMMAND`.
         """
-        given = self._obeyed(commands)
+        given = self._checked("command", commands)
         begin_decision(self.rules, self.games)
-        self._go_on(given, given)
-
-    def _go_on(self, wanted: Array, commands: Array) -> None:
-        """Move the boats of a decision that has begun, first under ``commands``, and apply the rules."""
-        self._commands[:] = commands
-        advance_games(self.rules, self.games, wanted, self._commands)
+        self._commands[:] = given
+        advance_games(self.rules, self.games, given, self._commands)
 
     def start_seen(self, seen: Array) -> None:
         """Start all games with boats that something else moves, such as real ones, where they are.
@@ -251,28 +208,23 @@ class BatchedMctf:
         Raises:
             GameError: see `commands` and `advance`.
         """
-        wanted = self._checked("actions", actions)
-        self._refuse("action", first_unusable(wanted))
+        wanted = self._checked("action", actions)
         with self._power_plays():
             commands = self.commands(wanted)
             if command_filter is not None:
-                commands = self._obeyed(command_filter(self, commands))
+                commands = self._checked("command", command_filter(self, commands))
         begin_decision(self.rules, self.games)
         if command_filter is None:
-            self._go_on(wanted, commands)
+            self._commands[:] = commands
+            advance_games(self.rules, self.games, wanted, self._commands)
         else:
             move_games(self.rules, self.games, commands)
             for _ in range(1, self.config.decision_steps):
-                move_games(self.rules, self.games, self._obeyed(command_filter(self, self.commands(wanted))))
+                commands = self._checked("command", command_filter(self, self.commands(wanted)))
+                move_games(self.rules, self.games, commands)
             end_decision(self.rules, self.games)
         reward_games(self.rules, self.games, self.rewards)
         return self.observe(), self.rewards, self.terminated, self.truncated
-
-    def _obeyed(self, commands: Any) -> Array:
-        """What a filter returned, checked."""
-        given = self._checked("commands", commands)
-        self._refuse("command", first_unusable(given))
-        return given
 
     @contextmanager
     def _power_plays(self) -> Iterator[None]:
@@ -294,29 +246,20 @@ class BatchedMctf:
         """A frozen copy of one game."""
         return view_game(self.config, self.rules, self.games, game)
 
-    def _checked(self, name: str, values: Any) -> Array:
+    def _checked(self, what: str, values: Any) -> Array:
+        """Actions or commands (B, n, 2), finite and not so large that the motion would overflow."""
+        shape = self._commands.shape
         try:
             array = numbers(values)
         except NoNumbersError as error:
-            raise GameError(
-                f"{name} are no numbers ({error}); give {self._commands.shape}: speed m/s, heading deg"
-            ) from None
-        if array.shape != self._commands.shape:
-            raise GameError(f"{name} have shape {array.shape}; give {self._commands.shape}: speed m/s, heading deg")
-        self._refuse_huge(name, array)
+            raise GameError(f"{what}s are no numbers ({error}); give {shape}: speed m/s, heading deg") from None
+        if array.shape != shape:
+            raise GameError(f"{what}s have shape {array.shape}; give {shape}: speed m/s, heading deg")
+        if not np.abs(array).max(initial=0.0) <= LARGEST_COMMAND:
+            game, boat, column = np.argwhere(~(np.abs(array) <= LARGEST_COMMAND))[0]
+            wrong = f"beyond {LARGEST_COMMAND:g}" if np.isfinite(array[game, boat, column]) else "not finite"
+            raise GameError(f"{what} of agent_{boat} in game {game} is {wrong}; give finite speed m/s and heading deg")
         return array
-
-    def _refuse_huge(self, name: str, array: Array) -> None:
-        """Refuse finite numbers so large that the motion would overflow; others are refused where they are read."""
-        if not np.abs(array).max(initial=0.0) > LARGEST_COMMAND:
-            return
-        huge = np.isfinite(array) & (np.abs(array) > LARGEST_COMMAND)
-        if huge.any():
-            game, boat, _ = np.argwhere(huge)[0]
-            raise GameError(
-                f"{name.removesuffix('s')} of agent_{boat} in game {game} is beyond {LARGEST_COMMAND:g}; "
-                "give speed m/s and heading deg"
-            )
 
     def _checked_sight(self, seen: Any) -> Array:
         array = np.array(seen, dtype=np.float64, order="C")
@@ -332,8 +275,3 @@ class BatchedMctf:
     def _check_game(self, game: int) -> None:
         if not 0 <= game < self.n_games:
             raise GameError(f"there is no game {game}; games are 0..{self.n_games - 1}")
-
-    def _refuse(self, what: str, number: int) -> None:
-        if number >= 0:
-            game, boat = divmod(number, self.n_boats)
-            raise GameError(f"{what} of agent_{boat} in game {game} is not finite; give finite speed and heading")

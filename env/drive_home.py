@@ -67,22 +67,6 @@ def _drive(rules: Rules, games: Games, b: int, i: int, command: Array) -> None:
 
 
 @lean_kernel
-def decide_commands(rules: Rules, games: Games, actions: Array, commands: Array) -> int:
-    """What every boat will obey; fills ``commands`` and ``games.driven``.
-
-    Args:
-        rules: the rules.
-        games: the games; only ``driven`` is written.
-        actions: (B, n, 2) what the policies want: speed m/s, relative heading deg.
-        commands: (B, n, 2) output, same units.
-
-    Returns:
-        -1, or the flat number ``b * n + i`` of the first boat whose own command is not finite and would be obeyed.
-    """
-    return decide_games(rules, games, actions, commands, 0, games.state.shape[0])
-
-
-@lean_kernel
 def decide_boat(rules: Rules, games: Games, actions: Array, commands: Array, b: int, i: int) -> None:
     """What one boat will obey; fills its row of ``commands``, and ``games.driven``."""
     state = games.state[b, i]
@@ -103,14 +87,20 @@ def decide_boat(rules: Rules, games: Games, actions: Array, commands: Array, b: 
 
 
 @lean_kernel
-def decide_games(rules: Rules, games: Games, actions: Array, commands: Array, first: int, last: int) -> int:
+def decide_games(rules: Rules, games: Games, actions: Array, commands: Array, first: int, last: int) -> None:
     """`decide_commands` of the games first..last-1."""
     for b in range(first, last):
         for i in range(rules.n_boats):
             decide_boat(rules, games, actions, commands, b, i)
-            if not (math.isfinite(actions[b, i, 0]) and math.isfinite(actions[b, i, 1])):
-                return b * rules.n_boats + i
-    return -1
+
+
+@lean_kernel
+def decide_commands(rules: Rules, games: Games, actions: Array, commands: Array) -> None:
+    """What every boat will obey, ``commands`` (B, n, 2), where policies want ``actions``: m/s, relative heading deg.
+
+    Of the games only ``driven`` is written.
+    """
+    decide_games(rules, games, actions, commands, 0, games.state.shape[0])
 
 
 CLEARANCE_M = 1.0

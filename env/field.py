@@ -22,32 +22,20 @@ CORNER_INSET_M = 10.0
 
 @dataclass(frozen=True)
 class FieldGeometry:
-    """Fixed lines and points of a field, m.
+    """Fixed lines and points of a field, m."""
 
-    Attributes:
-        size: (2,) width and height.
-        diagonal: length of the diagonal.
-        flag_home: (2, 2) homes of the blue and the red flag.
-        scrimmage: (2, 2) ends of the dividing line.
-        walls: (2, 4, 2, 2) per team its four walls as segments; wall 1 is the one behind the own flag, then round
-            the field the same way for both teams, so that both see the same picture.
-        side_sign: (2,) sign of the cross product (line x point) on each team's side.
-    """
-
-    size: Array
-    diagonal: float
-    flag_home: Array
-    scrimmage: Array
+    size: Array  # (2,) width and height
+    diagonal: float  # length of the diagonal
+    flag_home: Array  # (2, 2) homes of the blue and the red flag
+    scrimmage: Array  # (2, 2) ends of the dividing line
+    # (2, 4, 2, 2) per team its four walls as segments; wall 1 is the one behind the own flag, then round the field
+    # the same way for both teams, so that both see the same picture
     walls: Array
-    side_sign: Array
+    side_sign: Array  # (2,) sign of the cross product (line x point) on each team's side
 
 
 def field_geometry(config: GameConfig) -> FieldGeometry:
-    """Geometry of a config's field.
-
-    Raises:
-        ConfigError: a flag home lies outside, or the dividing line does not part the flags.
-    """
+    """Geometry of a config's field; a flag outside, or not parted from the other, is a `ConfigError`."""
     size = np.array(config.env_bounds_m)
     homes = _flag_homes(config, size)
     scrimmage = _scrimmage(config, size, homes)
@@ -92,11 +80,7 @@ def _flag_homes(config: GameConfig, size: Array) -> Array:
 
 
 def line_through_field(size: Array, point: Array, direction: Array) -> Array:
-    """The two points where a line leaves the field: first along ``direction``, then against it, shape (2, 2).
-
-    Raises:
-        ConfigError: the line misses the field.
-    """
+    """The two points (2, 2) where a line leaves the field: first along ``direction``, then against it."""
     low, high = -math.inf, math.inf
     for axis in (0, 1):
         if direction[axis] == 0.0:

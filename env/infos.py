@@ -11,14 +11,11 @@ from steerclear.shield.exceptions import GameError
 from steerclear.shield.jit import Array, lean_kernel
 from steerclear.shield.platforms import layout as L
 
-from .angles import wrap_bearing
 from .arrays import Games, Rules
 from .config import GameConfig
 from .core import BatchedMctf
-from .field import FieldGeometry
-from .observation_layout import Key, sight_of_line
-from .observe import observe_raw
-from .obstacles import distance_and_heading
+from .observation_layout import Key, bounds_of, name_of, sight_of_line
+from .observe import observe_raw, see_obstacles
 
 BOOLEAN_ENTRIES = frozenset(
     {"has_flag", "on_side", "oob", "is_tagged", "is_disabled", "blue_flag_pickup", "red_flag_pickup"}
@@ -26,21 +23,16 @@ BOOLEAN_ENTRIES = frozenset(
 
 
 class InfoWriter:
-    """Writes ``infos`` of a single game.
-
-    Args:
-        core: the games; game 0 is described.
-    """
+    """Writes ``infos`` of game 0 of ``core``."""
 
     def __init__(self, core: BatchedMctf) -> None:
         self._core = core
-        config, field = core.config, core.field
-        top_speed = float(core.max_speed_mps.max())
         low, high = core.observation_low, core.observation_high
         self.observation = VectorNormalizer(core.observation_keys, [1] * core.n_obs, low, high)
-        keys = global_state_keys(config)
-        low, high = global_state_bounds(config, field, top_speed)
-        self.global_state = VectorNormalizer(keys, [entry_size(key) for key in keys], low, high)
+        keys = global_state_keys(core.config)
+        low, high = bounds_of(keys, core.config, core.field, float(core.max_speed_mps.max()))
+        sizes = [2 if name_of(key).endswith(("pos", "flag_home")) else 1 for key in keys]
+        self.global_state = VectorNormalizer(keys, sizes, low, high)
         self._observation_booleans = [k for k, key in enumerate(core.observation_keys) if _is_boolean(key)]
         self._global_booleans = [key for key in keys if _is_boolean(key)]
         self._raw = np.zeros((1, core.n_boats, core.n_obs))
@@ -71,7 +63,7 @@ class InfoWriter:
 
 
 def _is_boolean(key: Key) -> bool:
-    return (key if isinstance(key, str) else key[1]) in BOOLEAN_ENTRIES
+    return name_of(key) in BOOLEAN_ENTRIES
 
 
 class VectorNormalizer:
@@ -87,65 +79,41 @@ class VectorNormalizer:
     """
 
     def __init__(self, keys: Sequence[Key], sizes: Sequence[int], low: Array, high: Array) -> None:
-        self.keys = tuple(keys)
-        self.sizes = tuple(sizes)
-        self.low = low
-        self.high = high
-        starts = np.cumsum([0, *self.sizes])
-        self._spans = {key: (int(starts[k]), int(starts[k + 1])) for k, key in enumerate(self.keys)}
-        self.is_angle = np.repeat([_is_angle(key) for key in self.keys], self.sizes)
+        self.keys, self.sizes = tuple(keys), tuple(sizes)
+        self.low, self.high = low, high
+        self.flattened_length = len(low)
+        self._ends = np.cumsum(self.sizes).tolist()
+        self.is_angle = np.repeat([name_of(key).endswith(("bearing", "heading")) for key in self.keys], self.sizes)
         self.normalized_space = Box(-1.0, 1.0, (len(low),), np.float32)
         self.unnormalized_space = Box(low.astype(np.float32), high.astype(np.float32), dtype=np.float32)
 
-    @property
-    def flattened_length(self) -> int:
-        """Numbers in the vector."""
-        return len(self.low)
-
     def flattened(self, entries: Mapping[Key, Any]) -> np.ndarray:
-        """Raw vector (n,) float32 of a dict with every entry.
-
-        Raises:
-            GameError: an entry is missing.
-        """
+        """Raw vector (n,) float32 of a dict with every entry."""
         missing = [key for key in self.keys if key not in entries]
         if missing:
             raise GameError(f"entries are missing: {missing[:5]}; give all {len(self.keys)}")
         return np.concatenate([np.ravel(entries[key]) for key in self.keys]).astype(np.float32)
 
     def normalized(self, entries: Mapping[Key, Any]) -> np.ndarray:
-        """Vector (n,) float32 in [-1, 1] of a dict with every entry.
-
-        Raises:
-            GameError: an entry is missing.
-        """
+        """Vector (n,) float32 in [-1, 1] of a dict with every entry."""
         raw = self.flattened(entries).astype(np.float64)
         half = 0.5 * (self.high - self.low)
         return np.clip((raw - 0.5 * (self.high + self.low)) / half, -1.0, 1.0).astype(np.float32)
 
     def unnormalized(self, vector: Any) -> dict[Key, Any]:
-        """Entries of a normalised vector (n,); entries of one number as floats, positions as (2,) arrays.
-
-        Raises:
-            GameError: the vector has another length.
-        """
+        """Entries of a normalised vector (n,); entries of one number as floats, positions as (2,) arrays."""
         values = np.asarray(vector, dtype=np.float64)
         if values.shape != self.low.shape:
             raise GameError(f"the vector has shape {values.shape}; give {self.low.shape}")
-        raw = 0.5 * (self.high - self.low) * values + 0.5 * (self.high + self.low)
-        return self.named(raw)
+        return self.named(0.5 * (self.high - self.low) * values + 0.5 * (self.high + self.low))
 
     def named(self, raw: Array) -> dict[Key, Any]:
         """Entries of a raw vector (n,)."""
         values = raw.tolist()
         return {
-            key: values[start] if stop - start == 1 else np.array(raw[start:stop])
-            for key, (start, stop) in self._spans.items()
+            key: values[end - 1] if size == 1 else np.array(raw[end - size : end])
+            for key, size, end in zip(self.keys, self.sizes, self._ends, strict=True)
         }
-
-
-def _is_angle(key: Key) -> bool:
-    return (key if isinstance(key, str) else key[1]).endswith(("bearing", "heading"))
 
 
 N_BOAT = 11
@@ -181,39 +149,6 @@ def global_state_keys(config: GameConfig) -> tuple[Key, ...]:
     return (*keys, *FLAG_ENTRIES, *TEAM_ENTRIES)
 
 
-def entry_size(key: Key) -> int:
-    """How many numbers an entry takes: 2 for positions, 1 for everything else."""
-    name = key if isinstance(key, str) else key[1]
-    return 2 if name == "pos" or name in FLAG_ENTRIES else 1
-
-
-def global_state_bounds(config: GameConfig, field: FieldGeometry, max_speed_mps: float) -> tuple[Array, Array]:
-    """Lower and upper bounds of the global state vector, each (n_global,)."""
-    buffer = 5.0 * max(config.agent_radius_m)
-    low: list[float] = []
-    high: list[float] = []
-    for key in global_state_keys(config):
-        name = key if isinstance(key, str) else key[1]
-        if entry_size(key) == 2:
-            low += [-buffer, -buffer]
-            high += list(field.size + buffer)
-            continue
-        bounds = (0.0, 1.0)
-        if name.endswith(("heading", "bearing")):
-            bounds = (-180.0, 180.0)
-        elif name.endswith("distance"):
-            bounds = (0.0, field.diagonal)
-        elif name == "speed":
-            bounds = (0.0, max_speed_mps)
-        elif name == "tagging_cooldown":
-            bounds = (0.0, config.tagging_cooldown_s)
-        elif name.endswith("score"):
-            bounds = (0.0, float(config.max_score))
-        low.append(bounds[0])
-        high.append(bounds[1])
-    return np.array(low), np.array(high)
-
-
 @lean_kernel
 def _describe_boat(rules: Rules, games: Games, b: int, i: int, out: Array) -> None:
     state = games.state[b, i]
@@ -232,10 +167,7 @@ def _describe_boat(rules: Rules, games: Games, b: int, i: int, out: Array) -> No
     if rules.shows_disabled:
         out[at] = games.is_disabled[b, i]
         at += 1
-    for k in range(rules.obstacles.bounds.shape[0]):
-        distance, towards = distance_and_heading(rules.obstacles, k, x, y)
-        out[at + 2 * k] = distance - rules.agent_radius[i]
-        out[at + 2 * k + 1] = wrap_bearing(towards - heading)
+    see_obstacles(rules, games.state[b], i, out, at)
 
 
 @lean_kernel

@@ -77,7 +77,7 @@ class MctfEnv(PyquaticusAttributes, ParallelEnv[str, np.ndarray, Any]):
         points = field_points(self.core.field.size)
         kinds = action_kinds(self.config, action_kind)
         self.action_kinds = kinds
-        self._decoder = ActionDecoder(self.config, kinds, self.core.max_speed_mps, points, self.core.field.size)
+        self._decoder = ActionDecoder(self.config, kinds, points)
         self._info_writer = InfoWriter(self.core)
         self.agent_obs_normalizer = self._info_writer.observation
         self.global_state_normalizer = self._info_writer.global_state

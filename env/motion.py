@@ -72,13 +72,10 @@ def bounce_off(rules: Rules, games: Games, b: int, i: int) -> None:
 
 @lean_kernel
 def obey(params: Array, state: Array, is_float32: bool, was_float32: bool, command: Array, dt_s: float) -> bool:
-    """Advance a boat by one step under a command (speed m/s, relative heading deg).
+    """Advance a boat by one step; tells whether the heading controller's error came in single precision.
 
-    The reference subtracts the heading controller's last two errors in single precision when both reached it so;
-    the memory is shifted so that the double-precision derivative comes out the same.
-
-    Returns:
-        Whether the error now in the heading controller's memory came in single precision.
+    The reference subtracts the controller's last two errors in single precision when both reached it so; the memory is
+    shifted so that the double-precision derivative comes out the same.
     """
     error = command[1]
     memory = state[L.HEADING_ERROR]
@@ -120,10 +117,7 @@ def move_boat(rules: Rules, games: Games, commands: Array, b: int, i: int) -> No
 
 @lean_kernel
 def move_boats(rules: Rules, games: Games, commands: Array, first: int, last: int) -> None:
-    """Every boat's turn in a step, in boat order, in the games first..last-1.
-
-    ``commands`` is (B, n, 2): speed m/s, relative heading deg.
-    """
+    """Every boat's turn in a step, in boat order, in the games first..last-1, under ``commands`` (B, n, 2)."""
     for b in range(first, last):
         for i in range(rules.n_boats):
             move_boat(rules, games, commands, b, i)
@@ -139,10 +133,9 @@ def see_boat(state: Array, seen: Array) -> None:
 
 @lean_kernel
 def place_boats(rules: Rules, games: Games, seen: Array, first: int, last: int) -> None:
-    """`move_boats` for boats that something else moves: same order, same bookkeeping, but nothing is moved.
+    """`move_boats` for boats that something else moves: ``seen`` (B, n, 4) x m, y m, heading deg, speed m/s, now.
 
-    ``seen`` is (B, n, 4): x m, y m, heading deg, speed m/s, where the boats are now. A boat whose position is NaN
-    is nowhere: on no side and out of bounds.
+    A boat whose position is NaN is nowhere: on no side and out of bounds.
     """
     has_obstacles = rules.obstacles.bounds.shape[0] > 0
     for b in range(first, last):
@@ -184,10 +177,7 @@ def _solve_along_x(
 
 @lean_kernel
 def entry_point(inside: Array, before: Array, centre: Array, radius: float) -> tuple[float, float]:
-    """Where the ray from ``inside`` through ``before`` leaves a circle, m.
-
-    A boat that did not move is taken straight outwards from the centre. Points as (x, y) arrays.
-    """
+    """Where the ray from (x, y) ``inside`` through ``before`` leaves a circle, m; outwards where it did not move."""
     x, y = inside[0], inside[1]
     to_x, to_y = before[0], before[1]
     if x == to_x and y == to_y:
@@ -205,14 +195,7 @@ def entry_point(inside: Array, before: Array, centre: Array, radius: float) -> t
 
 @lean_kernel
 def keep_out(state: Array, before: Array, centre: Array, radius: float) -> None:
-    """Put a boat that got inside the circle back onto it, keeping only the tangential part of its velocity.
-
-    Args:
-        state: the boat's state row, changed in place.
-        before: (x, y) before the move, m.
-        centre: (x, y) of the flag's home, m.
-        radius: keep-out distance plus the boat's radius, m.
-    """
+    """Put a boat that got inside the circle, from (x, y) ``before``, back onto it, with its tangential velocity."""
     x, y = entry_point(state[: L.Y + 1], before, centre, radius + BUFFER_M)
     heading = math.radians(state[L.HEADING])
     # single precision, as in the reference

@@ -6,6 +6,8 @@ Bearings are relative to the boat's heading, deg, clockwise, in (-180, 180]; dis
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from steerclear.shield.jit import Array, IntArray, lean_kernel
@@ -33,9 +35,9 @@ OTHER_ENTRIES = (
 )
 
 
-def sizes(shows_disabled: bool) -> tuple[int, int]:
-    """How many numbers there are about the boat itself and the field, scores last, and about each other boat."""
-    return (22, 9) if shows_disabled else (21, 8)
+def name_of(key: Key) -> str:
+    """What an entry tells, whoever it is of."""
+    return key if isinstance(key, str) else key[1]
 
 
 def observation_keys(config: GameConfig) -> tuple[Key, ...]:
@@ -54,12 +56,9 @@ def observation_keys(config: GameConfig) -> tuple[Key, ...]:
 
 
 def boat_slots(config: GameConfig) -> IntArray:
-    """Where boat i's observation holds boat j, (n, n): teammates in order without itself, then opponents.
-
-    A boat's own slot is such that its status lies at the same offset as another boat's.
-    """
+    """Where boat i's observation holds boat j, (n, n): teammates, then opponents; itself so that its status fits."""
     n, size = config.n_boats, config.team_size
-    own_numbers, other_numbers = sizes(config.shows_disabled)
+    own_numbers, other_numbers = (22, 9) if config.shows_disabled else (21, 8)  # scores last
     slots = np.full((n, n), OWN_STATUS - OTHER_STATUS, dtype=np.int64)
     for i in range(n):
         mates = [j for j in range(n) if j // size == i // size and j != i]
@@ -69,24 +68,25 @@ def boat_slots(config: GameConfig) -> IntArray:
     return slots
 
 
-def observation_bounds(config: GameConfig, field: FieldGeometry, max_speed_mps: float) -> tuple[Array, Array]:
-    """Lower and upper bounds of the raw observation, each (n_obs,)."""
-    ranges = {
+def bounds_of(
+    keys: Sequence[Key], config: GameConfig, field: FieldGeometry, max_speed_mps: float
+) -> tuple[Array, Array]:
+    """Lower and upper bounds of raw entries, each (n,); positions take two numbers."""
+    beyond = 5.0 * max(config.agent_radius_m)
+    place = ([-beyond, -beyond], [*(field.size + beyond)])
+    ranges: dict[str, Any] = {
         "bearing": (-180.0, 180.0),
-        "relative_heading": (-180.0, 180.0),
+        "heading": (-180.0, 180.0),
         "distance": (0.0, field.diagonal),
         "speed": (0.0, max_speed_mps),
         "tagging_cooldown": (0.0, config.tagging_cooldown_s),
         "score": (0.0, float(config.max_score)),
+        "pos": place,
+        "flag_home": place,
     }
-    low, high = [], []
-    for key in observation_keys(config):
-        name = key if isinstance(key, str) else key[1]
-        kind = next((end for end in ranges if name.endswith(end)), None)
-        bounds = (0.0, 1.0) if kind is None else ranges[kind]
-        low.append(bounds[0])
-        high.append(bounds[1])
-    return np.array(low), np.array(high)
+    ends = [next((end for end in ranges if name_of(key).endswith(end)), "") for key in keys]
+    low, high = zip(*(ranges.get(end, (0.0, 1.0)) for end in ends), strict=True)
+    return np.hstack(low), np.hstack(high)
 
 
 START_X, START_Y, ALONG_X, ALONG_Y, LENGTH, TO_LEFT, TO_RIGHT = range(7)

@@ -8,24 +8,25 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from steerclear.shield.jit import Array, BoolArray, IntArray, lean_kernel
+from steerclear.shield.jit import Array, IntArray, lean_kernel
 from steerclear.shield.platforms import layout as L
 
 from .angles import heading_to, wrap_bearing
 from .arrays import Games, Rules
 from .observation_layout import OTHER_STATUS, OWN_STATUS, sight_of_line, sight_of_point
-from .obstacles import Obstacles, distance_and_heading
+from .obstacles import distance_and_heading
 
 
 @lean_kernel
-def _see_field(raw: Array, i: int, state: Array, lines: Array, homes: Array, team: int) -> None:
-    """Flag homes, walls and the dividing line (packed ``lines`` (5, 7)) as seen by boat ``i``."""
-    x, y, heading = state[i, L.X], state[i, L.Y], state[i, L.HEADING]
-    raw[i, 0], raw[i, 1] = sight_of_point(x, y, heading, homes[1 - team, 0], homes[1 - team, 1])
-    raw[i, 2], raw[i, 3] = sight_of_point(x, y, heading, homes[team, 0], homes[team, 1])
+def _see_field(rules: Rules, state: Array, i: int, row: Array) -> None:
+    """Flag homes, walls and the dividing line as boat ``i`` sees them."""
+    x, y, heading, team = state[i, L.X], state[i, L.Y], state[i, L.HEADING], rules.team[i]
+    homes, lines = rules.flag_home, rules.sight_lines[team]
+    row[0], row[1] = sight_of_point(x, y, heading, homes[1 - team, 0], homes[1 - team, 1])
+    row[2], row[3] = sight_of_point(x, y, heading, homes[team, 0], homes[team, 1])
     for k in range(lines.shape[0]):
-        raw[i, 4 + 2 * k], raw[i, 5 + 2 * k] = sight_of_line(x, y, heading, lines, k)
-    raw[i, 14] = state[i, L.SPEED]
+        row[4 + 2 * k], row[5 + 2 * k] = sight_of_line(x, y, heading, lines, k)
+    row[14] = state[i, L.SPEED]
 
 
 @lean_kernel
@@ -49,67 +50,44 @@ def _see_each_other(raw: Array, state: Array, i: int, j: int, slots: IntArray) -
 
 
 @lean_kernel
-def _see_status(
-    raw: Array,
-    i: int,
-    slots: IntArray,
-    has_flag: BoolArray,
-    on_side: BoolArray,
-    cooldown: Array,
-    is_tagged: BoolArray,
-    is_disabled: BoolArray,
-    shows_disabled: bool,
-) -> None:
-    """Status of boat ``i`` (arrays (n,) of one game) into every boat's observation, its own included."""
-    for j in range(raw.shape[0]):
-        at = slots[j, i] + OTHER_STATUS
-        raw[j, at] = has_flag[i]
-        raw[j, at + 1] = on_side[i]
-        raw[j, at + 2] = cooldown[i]
-        raw[j, at + 3] = is_tagged[i]
-        if shows_disabled:
-            raw[j, at + 4] = is_disabled[i]
+def _see_status(rules: Rules, games: Games, b: int, i: int, seen: Array) -> None:
+    """Status of boat ``i`` into every boat's observation, its own included."""
+    for j in range(rules.n_boats):
+        at = rules.slots[j, i] + OTHER_STATUS
+        seen[j, at] = games.has_flag[b, i]
+        seen[j, at + 1] = games.on_side[b, i]
+        seen[j, at + 2] = games.tagging_cooldown_s[b, i]
+        seen[j, at + 3] = games.is_tagged[b, i]
+        if rules.shows_disabled:
+            seen[j, at + 4] = games.is_disabled[b, i]
 
 
 @lean_kernel
-def _see_obstacles(row: Array, state: Array, obstacles: Obstacles, radius: float, at: int) -> None:
-    """Distance (less the boat's radius) and bearing of every obstacle, from ``row[at]`` on."""
-    for k in range(obstacles.bounds.shape[0]):
-        distance, heading = distance_and_heading(obstacles, k, state[L.X], state[L.Y])
-        row[at + 2 * k] = distance - radius
-        row[at + 2 * k + 1] = wrap_bearing(heading - state[L.HEADING])
+def see_obstacles(rules: Rules, state: Array, i: int, row: Array, at: int) -> None:
+    """Distance (less the boat's radius) and bearing of every obstacle from boat ``i``, from ``row[at]`` on."""
+    for k in range(rules.obstacles.bounds.shape[0]):
+        distance, heading = distance_and_heading(rules.obstacles, k, state[i, L.X], state[i, L.Y])
+        row[at + 2 * k] = distance - rules.agent_radius[i]
+        row[at + 2 * k + 1] = wrap_bearing(heading - state[i, L.HEADING])
 
 
 @lean_kernel
 def observe_raw(rules: Rules, games: Games, raw: Array, first: int, last: int) -> None:
     """Raw observations of all boats of the games first..last-1 into ``raw`` (last - first, n, n_obs)."""
-    n_boats = rules.n_boats
     status = 5 if rules.shows_disabled else 4
     scores = OWN_STATUS + status
+    obstacles = scores + 2 + (OTHER_STATUS + status) * (rules.n_boats - 1)
     for b in range(first, last):
-        seen = raw[b - first]
-        state = games.state[b]
-        for i in range(n_boats):
+        seen, state = raw[b - first], games.state[b]
+        for i in range(rules.n_boats):
             team = rules.team[i]
-            _see_field(seen, i, state, rules.sight_lines[team], rules.flag_home, team)
+            _see_field(rules, state, i, seen[i])
             seen[i, scores] = games.captures[b, team]
             seen[i, scores + 1] = games.captures[b, 1 - team]
-            for j in range(i + 1, n_boats):
+            for j in range(i + 1, rules.n_boats):
                 _see_each_other(seen, state, i, j, rules.slots)
-            _see_status(
-                seen,
-                i,
-                rules.slots,
-                games.has_flag[b],
-                games.on_side[b],
-                games.tagging_cooldown_s[b],
-                games.is_tagged[b],
-                games.is_disabled[b],
-                rules.shows_disabled,
-            )
-            if rules.obstacles.bounds.shape[0] > 0:
-                at = scores + 2 + (OTHER_STATUS + status) * (n_boats - 1)
-                _see_obstacles(seen[i], state[i], rules.obstacles, rules.agent_radius[i], at)
+            _see_status(rules, games, b, i, seen)
+            see_obstacles(rules, state, i, seen[i], obstacles)
 
 
 @lean_kernel

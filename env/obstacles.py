@@ -16,19 +16,12 @@ TOUCH_MARGIN_M = 1e-4
 
 
 class Obstacles(NamedTuple):
-    """Obstacles for compiled code: circles first, then polygons, numbered in this order.
+    """Obstacles for compiled code: circles first, then polygons, numbered in this order."""
 
-    Attributes:
-        circles: (C, 3) radius, x, y, m.
-        edges: (E, 2, 2) all polygons' edges as segments, m.
-        edge_start: (P + 1,) where each polygon's edges begin in ``edges``.
-        bounds: (C + P, 3) x, y, radius of a circle around each obstacle, m.
-    """
-
-    circles: Array
-    edges: Array
-    edge_start: IntArray
-    bounds: Array
+    circles: Array  # (C, 3) radius, x, y, m
+    edges: Array  # (E, 2, 2) all polygons' edges as segments, m
+    edge_start: IntArray  # (P + 1,) where each polygon's edges begin in ``edges``
+    bounds: Array  # (C + P, 3) x, y, radius of a circle around each obstacle, m
 
 
 def pack_obstacles(obstacles: Mapping[str, Any] | None) -> Obstacles:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -29,33 +30,8 @@ TEAM_EVENTS = {"flag_taken": "flag_taken", "captures": "captures", "grabs": "gra
 """Array of the trace -> array of `BatchedMctf`; compared exactly at every step."""
 
 
-@dataclass
-class _Deviations:
-    """Largest deviations so far; fields as in `ParityReport`."""
-
-    position_m: float = 0.0
-    heading_deg: float = 0.0
-    speed_mps: float = 0.0
-    cooldown_s: float = 0.0
-    flag_position_m: float = 0.0
-    observation_normalised: float = 0.0
-    observation_raw: float = 0.0
-    global_state: float = 0.0
-
-    def widen(self, name: str, difference: np.ndarray) -> None:
-        """Take the largest absolute difference into account; NaN counts as infinitely far."""
-        largest = float(np.max(np.abs(difference), initial=0.0))
-        setattr(self, name, max(getattr(self, name), np.inf if np.isnan(largest) else largest))
-
-
 def replay_trace(path: str | os.PathLike[str]) -> ParityReport:
-    """Replay a recorded game from its first state under its actions, over its whole length.
-
-    Args:
-        path: an npz file as the reference traces are.
-
-    Returns:
-        The largest deviations and every event mismatch; ``report.passed`` holds them against the tolerances.
+    """Replay a recorded game, an npz file, from its first state under its actions, over its whole length.
 
     Raises:
         TraceError: the file cannot be read, lacks an array or starts from a state the rules do not allow.
@@ -64,27 +40,24 @@ def replay_trace(path: str | os.PathLike[str]) -> ParityReport:
 
 
 def compare(trace: Trace) -> ParityReport:
-    """`replay_trace` of a trace that is already read.
-
-    Raises:
-        TraceError: the trace starts from a state, or holds an action, that the rules do not allow.
-    """
+    """`replay_trace` of a trace that is read; a `TraceError` where the rules do not allow its start or an action."""
     core = BatchedMctf(trace.config, n_games=1, seed=0)
     writer = InfoWriter(core)
     _check_keys(trace, writer)
-    deviations = _Deviations()
+    largest = dict.fromkeys(asdict(Tolerances()), 0.0)
     mismatches: list[EventMismatch] = []
     try:
         core.reset_game(0, _first_state(trace))
         for step in range(trace.steps + 1):
-            _compare_motion(trace, core, step, deviations)
-            _compare_views(trace, core, writer, step, deviations)
+            for name, difference in (*_motion(trace, core, step), *_views(trace, core, writer, step)):
+                found = float(np.max(np.abs(difference), initial=0.0))
+                largest[name] = max(largest[name], np.inf if np.isnan(found) else found)
             mismatches += _compare_events(trace, core, step)
             if step < trace.steps:
                 core.step(_commands(trace, core, step)[np.newaxis])
     except (GameError, ValueError, OverflowError) as error:  # a state or an action that no game has
         raise TraceError(f"{trace.path}: {error}") from error
-    return ParityReport(str(trace.path), trace.steps, mismatches=tuple(mismatches), **vars(deviations))
+    return ParityReport(str(trace.path), trace.steps, mismatches=tuple(mismatches), **largest)
 
 
 def _check_keys(trace: Trace, writer: InfoWriter) -> None:
@@ -125,26 +98,28 @@ def _commands(trace: Trace, core: BatchedMctf, step: int) -> Array:
     return action
 
 
-def _compare_motion(trace: Trace, core: BatchedMctf, step: int, deviations: _Deviations) -> None:
+def _motion(trace: Trace, core: BatchedMctf, step: int) -> Iterator[tuple[str, Array]]:
+    """Differences in how boats and flags move, by name of the tolerance."""
     state, arrays = core.state[0], trace.arrays
-    deviations.widen("position_m", np.hypot(*(state[:, [L.X, L.Y]] - arrays["position"][step]).T))
-    deviations.widen("heading_deg", _turn(state[:, L.HEADING], arrays["heading"][step], 360.0))
-    deviations.widen("speed_mps", state[:, L.SPEED] - arrays["speed"][step])
-    deviations.widen("cooldown_s", core.tagging_cooldown_s[0] - arrays["tagging_cooldown"][step])
-    deviations.widen("flag_position_m", core.flag_position[0] - arrays["flag_position"][step])
+    yield "position_m", np.hypot(*(state[:, [L.X, L.Y]] - arrays["position"][step]).T)
+    yield "heading_deg", _turn(state[:, L.HEADING], arrays["heading"][step], 360.0)
+    yield "speed_mps", state[:, L.SPEED] - arrays["speed"][step]
+    yield "cooldown_s", core.tagging_cooldown_s[0] - arrays["tagging_cooldown"][step]
+    yield "flag_position_m", core.flag_position[0] - arrays["flag_position"][step]
 
 
-def _compare_views(trace: Trace, core: BatchedMctf, writer: InfoWriter, step: int, deviations: _Deviations) -> None:
-    angles = writer.global_state.is_angle
+def _views(trace: Trace, core: BatchedMctf, writer: InfoWriter, step: int) -> Iterator[tuple[str, Array]]:
+    """Differences in what is seen, by name of the tolerance."""
+    arrays, angles = trace.arrays, writer.global_state.is_angle
     ours = writer.global_vector().astype(np.float32)
-    deviations.widen("global_state", _difference(ours, trace.arrays["global_state"][step], angles, 360.0))
-    if step % trace.observed_every:
+    yield "global_state", _difference(ours, arrays["global_state"][step], angles, 360.0)
+    row, rest = divmod(step, trace.observed_every)
+    if rest:
         return
-    row, angles = step // trace.observed_every, writer.observation.is_angle
-    theirs = trace.arrays["obs_normalized"][row]
-    deviations.widen("observation_normalised", _difference(core.observations[0], theirs, angles, 2.0))
+    angles = writer.observation.is_angle
+    yield "observation_normalised", _difference(core.observations[0], arrays["obs_normalized"][row], angles, 2.0)
     ours = writer.raw_observations().astype(np.float32)
-    deviations.widen("observation_raw", _difference(ours, trace.arrays["obs"][row], angles, 360.0))
+    yield "observation_raw", _difference(ours, arrays["obs"][row], angles, 360.0)
 
 
 def _difference(ours: np.ndarray, theirs: np.ndarray, is_angle: np.ndarray, full_turn: float) -> Array:
@@ -190,21 +165,13 @@ class Tolerances:
 
 @dataclass(frozen=True)
 class EventMismatch:
-    """One event that came out differently.
+    """One event that came out differently."""
 
-    Attributes:
-        step: index of the state, 0 is the start.
-        event: array of the trace.
-        who: agent id or team.
-        expected: value in the trace.
-        got: value in the replay.
-    """
-
-    step: int
-    event: str
-    who: str
-    expected: int
-    got: int
+    step: int  # index of the state, 0 is the start
+    event: str  # array of the trace
+    who: str  # agent id or team
+    expected: int  # value in the trace
+    got: int  # value in the replay
 
 
 @dataclass(frozen=True)

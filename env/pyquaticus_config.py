@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.wrappers.pyquaticus import KNOWN_SETTINGS
 
 from .config import GameConfig
 
@@ -52,33 +53,8 @@ ONLY = {
 }
 """Settings of which this package has one value only; another one is refused rather than ignored."""
 
-WITHOUT_EFFECT = frozenset(
-    {
-        "topo_contour_eps",
-        "slip_radius",  # of the reference's path planner; see drive_home
-        "n_circle_segments",
-        "normalize_state",  # infos always carry the global state as a dict
-        "short_obs_hist_interval",
-        "long_obs_hist_interval",
-        "lidar_range",
-        "num_lidar_rays",
-        "short_state_hist_interval",
-        "long_state_hist_interval",
-        "render_fps",
-        "screen_frac",
-        "arena_buffer_frac",
-        "render_agent_ids",
-        "render_field_points",
-        "render_traj_mode",
-        "render_traj_freq",
-        "render_traj_cutoff",
-        "render_lidar_mode",
-        "render_saving",
-        "render_transparency_alpha",
-        "suppress_numpy_warnings",
-    }
-)
-"""Settings of drawing, lidar and histories: accepted, not needed."""
+WITHOUT_EFFECT = KNOWN_SETTINGS - set(RENAMED) - set(ONLY)
+"""Settings of drawing, lidar, histories and path planning: accepted, not needed."""
 
 ONLY_2026 = frozenset({"tag_speed_frac", "tag_probability", "untag_radius", "power_play_percentage"})
 """Settings that only the environment of the 2026 competition has."""

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from steerclear.env.config import GameConfig
 from steerclear.env.record_file import (
     ARRAYS,
     LAYOUT,
@@ -25,6 +26,7 @@ from steerclear.shield.platforms.layout import HEADING, SPEED, X, Y
 
 __all__ = [
     "ARRAYS",
+    "DEFAULT_SEPARATION_M",
     "META_KEYS",
     "NOT_COVERED",
     "GameRecorder",
@@ -33,22 +35,62 @@ __all__ = [
     "find_breaches",
     "load",
     "make_record",
+    "meta_of",
     "read_meta",
     "save",
     "validate",
 ]
 
 
-def absolute_commands(commands: np.ndarray, heading_deg: np.ndarray) -> np.ndarray:
-    """Turn the game's commands into the record's.
+DEFAULT_SEPARATION_M = 2.5
+
+_BESIDE_THE_GAME: dict[str, Any] = {
+    "separation_m": DEFAULT_SEPARATION_M,
+    "policies": {"blue": "", "red": ""},
+    "shielded": [],
+    "seed": None,
+    "reason_names": [],
+    "title": "",
+}
+
+
+def meta_of(config: GameConfig, **settings: Any) -> dict[str, Any]:
+    """Return a record's ``meta`` for a game.
 
     Args:
-        commands: (n, 2) speed m/s and heading deg relative to the boat's own.
-        heading_deg: (n,) headings of the boats when the command is given.
+        config: The game's settings.
+        **settings: What the game does not know: ``separation_m``, ``policies`` {blue, red}, ``shielded`` (agent
+            ids), ``seed``, ``reason_names`` and ``title``. Those left out describe an unshielded, unnamed game.
 
     Returns:
-        (n, 2) speed m/s and absolute heading deg in [-180, 180).
+        A dict with all of ``record_file.META_KEYS``, the title, the scrimmage line and the obstacles. The radius
+        is one number, or one for each boat where they differ.
+
+    Raises:
+        TraceError: A setting is unknown.
     """
+    unknown = sorted(set(settings) - set(_BESIDE_THE_GAME))
+    if unknown:
+        raise TraceError(f"unknown {', '.join(unknown)}; a record takes {', '.join(_BESIDE_THE_GAME)}.")
+    (width, height), radii = config.env_bounds_m, config.agent_radius_m
+    same = ("dt_s", "decision_steps", "env_bounds_m", "team_size", "agent_ids", "catch_radius_m", "flag_keepout_m")
+    game = {name: getattr(config, name) for name in (*same, "obstacles")} | {
+        "corner_radius_m": config.corner_radius_m if "own_corners" in (config.capture_at, config.untag_at) else 0.0,
+        "team": [0] * config.team_size + [1] * config.team_size,
+        "flag_home": [
+            config.blue_flag_home_m or (width / 8, height / 2),
+            config.red_flag_home_m or (width * 7 / 8, height / 2),
+        ],
+        "scrimmage": config.scrimmage_m,
+        "agent_radius_m": radii[0] if len(set(radii)) == 1 else radii,
+        "platforms": [platform.name for platform in config.platforms],
+        "preset": config.preset_name,
+    }
+    return game | _BESIDE_THE_GAME | settings
+
+
+def absolute_commands(commands: np.ndarray, heading_deg: np.ndarray) -> np.ndarray:
+    """Turn commands (n, 2), speed m/s and relative heading deg, into the record's: absolute, deg in [-180, 180)."""
     absolute = np.array(commands, dtype=np.float64)
     absolute[:, 1] = (absolute[:, 1] + heading_deg + 180.0) % 360.0 - 180.0
     return absolute
@@ -96,11 +138,7 @@ class GameRecorder:
         self._rows: dict[str, list[np.ndarray]] = {}
 
     def start(self, view: Any, meta: Mapping[str, Any]) -> None:
-        """Begin a new game; what an earlier one left is dropped.
-
-        Args:
-            view: The game's state before its first step (a ``GameView``).
-            meta: Settings of the game, keyed by at least ``META_KEYS``.
+        """Begin a new game from a ``GameView`` of it and its settings, see `meta_of`.
 
         Raises:
             TraceError: ``meta`` lacks a key.
@@ -123,11 +161,11 @@ class GameRecorder:
 
         Args:
             view: The game's state after the step.
-            wanted: (n, 2) speed m/s and absolute heading deg asked for before the step.
-            sent: (n, 2) likewise, what the boats were told.
+            wanted: (n, 2) speed m/s and absolute heading deg commanded by the policy before the step.
+            sent: (n, 2) likewise, what the boats received.
             reason: (n,) reason codes; all ``NOT_COVERED`` when left out.
             intervened: (n,) bool; all False when left out.
-            safety_margin_m: (n,) certificate values, m; all NaN when left out.
+            safety_margin_m: (n,) safety margins, m; all NaN when left out.
 
         Raises:
             TraceError: ``start`` was not called, or an array has the wrong shape.

@@ -33,33 +33,12 @@ from typing import Any
 import numpy as np
 from steerclear.shield.exceptions import TraceError
 
-from .npz_file import read_arrays
-from .whole_file import whole_file
+from .whole_file import check_finite, check_shapes, read_arrays, save_arrays
 
 Record = dict[str, np.ndarray]
 
 NOT_COVERED = 6
 """Reason code of a boat for which no shield decided (``Reason.NOT_COVERED``)."""
-
-META_KEYS = (
-    "dt_s",
-    "env_bounds_m",
-    "team_size",
-    "agent_ids",
-    "team",
-    "flag_home",
-    "catch_radius_m",
-    "flag_keepout_m",
-    "agent_radius_m",
-    "separation_m",
-    "preset",
-    "policies",
-    "shielded",
-    "seed",
-    "reason_names",
-    "platforms",
-)
-"""Keys that ``meta`` must have; further keys (``obstacles``, ``title``, ``decision_steps``, ...) are kept."""
 
 LAYOUT: dict[str, tuple[tuple[str | int, ...], Any]] = {
     "position": (("T+1", "n", 2), np.float64),
@@ -86,16 +65,19 @@ ARRAYS = tuple(LAYOUT)
 LATER = ("is_disabled",)
 """Those that files of older versions lack; `load` and `make_record` fill them in."""
 
-_MUST_BE_FINITE = ("position", "heading_deg", "speed_mps", "flag_position", "breaches")
+FARTHEST_M = 1e6
+"""No boat, flag or edge of a field is further from the origin."""
+
+LONGEST_STEP_S = 10.0
+MOST_BOATS = 1000
+MOST_LETTERS = 1000
+"""Of a name."""
 
 _AGAIN = "Record the game again with GameRecorder and save() it."
 
 
 def read_meta(record: Mapping[str, np.ndarray]) -> dict[str, Any]:
     """Decode the record's ``meta``.
-
-    Args:
-        record: A record.
 
     Returns:
         The settings of the game, keyed by at least ``META_KEYS``.
@@ -112,14 +94,11 @@ def read_meta(record: Mapping[str, np.ndarray]) -> dict[str, Any]:
     missing = [key for key in META_KEYS if not isinstance(meta, dict) or key not in meta]
     if missing:
         raise TraceError(f"the record's meta lacks {', '.join(missing)}. Pass them to GameRecorder.start().")
-    return meta
+    return dict(meta)
 
 
 def validate(record: Mapping[str, np.ndarray]) -> None:
     """Check that a record is complete and that its shapes fit together.
-
-    Args:
-        record: Arrays to check.
 
     Raises:
         TraceError: An array is missing, has the wrong shape, or holds a value that cannot be drawn.
@@ -128,41 +107,29 @@ def validate(record: Mapping[str, np.ndarray]) -> None:
     missing = [name for name in ARRAYS if name not in record and name not in LATER]
     if missing:
         raise TraceError(f"the record lacks {', '.join(missing)}. {_AGAIN}")
-    check_meta(meta)
+    _check_settings(meta)
     layout = {name: entry for name, entry in LAYOUT.items() if name in record}
     if not all(record[name].ndim == len(axes) for name, (axes, _) in layout.items()):
         raise TraceError(f"the record's arrays have other shapes than a record's. {_AGAIN}")
-    check_kinds(record, {name: kind for name, (_, kind) in layout.items()})
-    n, steps = len(meta["agent_ids"]), len(record["wanted"])
-    sizes = {"T": steps, "T+1": steps + 1, "n": n, "K": len(record["breaches"])}
-    for name, (axes, _) in layout.items():
-        want = tuple(axis if isinstance(axis, int) else sizes[axis] for axis in axes)
-        if record[name].shape != want:
-            raise TraceError(f"the record's {name} has shape {record[name].shape}, expected {want}. {_AGAIN}")
-    for name in _MUST_BE_FINITE:
-        if not np.isfinite(record[name]).all():
-            raise TraceError(f"the record's {name} holds NaN or infinity. {_AGAIN}")
-    check_places(record)
-    _check_breaches(record["breaches"], steps, n)
+    for name, (_, kind) in layout.items():
+        if not np.can_cast(record[name].dtype, kind, "same_kind"):
+            raise TraceError(f"the record's {name} holds {record[name].dtype}, expected {np.dtype(kind)}")
+    n, steps, breaches = len(meta["agent_ids"]), len(record["wanted"]), record["breaches"]
+    sizes = {"T": steps, "T+1": steps + 1, "n": n, "K": len(breaches)}
+    check_shapes(record, {name: axes for name, (axes, _) in layout.items()}, sizes, "the record's ", _AGAIN)
+    finite = ("position", "heading_deg", "speed_mps", "flag_position", "breaches")
+    check_finite(record, finite, "the record's ", _AGAIN)
+    for name in ("position", "flag_position"):
+        if np.abs(record[name]).max(initial=0.0) > FARTHEST_M:
+            raise TraceError(f"the record's {name} is over {FARTHEST_M / 1e3:g} km away; give positions in m")
+    if not ((breaches[:, :3] >= 0).all() and (breaches[:, 0] <= steps).all() and (breaches[:, 1:3] < n).all()):
+        raise TraceError(f"the record's breaches name a step beyond {steps} or a boat beyond {n - 1}. {_AGAIN}")
     if len(meta["team"]) != n or len(meta["platforms"]) != n:
         raise TraceError(f"meta's team and platforms must have one entry for each of the {n} boats. {_AGAIN}")
 
 
-def _check_breaches(breaches: np.ndarray, steps: int, n: int) -> None:
-    inside = (breaches[:, :3] >= 0).all() and (breaches[:, 0] <= steps).all() and (breaches[:, 1:3] < n).all()
-    if not inside:
-        raise TraceError(f"the record's breaches name a step beyond {steps} or a boat beyond {n - 1}. {_AGAIN}")
-
-
 def make_record(meta: Mapping[str, Any], **arrays: Any) -> Record:
-    """Build a record from whole arrays, cast to the record's types.
-
-    Args:
-        meta: Settings of the game, keyed by at least ``META_KEYS``.
-        **arrays: The arrays named in ``ARRAYS``.
-
-    Returns:
-        A validated record.
+    """Build a validated record from a game's settings and whole arrays, cast to the types of ``LAYOUT``.
 
     Raises:
         TraceError: An array is missing, unknown, or does not fit the others.
@@ -177,14 +144,10 @@ def make_record(meta: Mapping[str, Any], **arrays: Any) -> Record:
 
 
 def save(record: Mapping[str, np.ndarray], path: str | os.PathLike[str]) -> Path:
-    """Write a record; an interrupted write leaves no half file and no damaged older one.
-
-    Args:
-        record: A record.
-        path: File to write; ``.npz`` is added when the name has no such ending.
+    """Write a record to an ``.npz`` file; an interrupted write leaves no half file and no damaged older one.
 
     Returns:
-        The path written.
+        The path written, to which ``.npz`` is added when it has no such ending.
 
     Raises:
         TraceError: The record is incomplete, or the folder cannot be written to.
@@ -193,19 +156,12 @@ def save(record: Mapping[str, np.ndarray], path: str | os.PathLike[str]) -> Path
     target = Path(path)
     if target.suffix != ".npz":
         target = target.with_name(target.name + ".npz")
-    with whole_file(target, TraceError) as part, part.open("wb") as stream:
-        np.savez_compressed(stream, allow_pickle=False, **record)
+    save_arrays(target, record)
     return target
 
 
 def load(path: str | os.PathLike[str]) -> Record:
-    """Read a record and check it.
-
-    Args:
-        path: An ``.npz`` file written by ``save``.
-
-    Returns:
-        The record.
+    """Read a record that ``save`` wrote and check it.
 
     Raises:
         TraceError: The file is missing, cut, not a record, or lacks an array.
@@ -224,32 +180,14 @@ def _filled(record: Record) -> Record:
 
 
 def plain(value: Any) -> Any:
-    """Let ``json`` write numpy values.
-
-    Raises:
-        TypeError: The value has no JSON form.
-    """
+    """Let ``json`` write numpy values."""
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     raise TypeError(f"{type(value).__name__} has no JSON form")
 
 
-FARTHEST_M = 1e6
-"""No boat, flag or edge of a field is further from the origin."""
-LONGEST_STEP_S = 10.0
-MOST_BOATS = 1000
-MOST_LETTERS = 1000
-"""Of a name."""
-
-Test = Callable[[Any], bool]
-
-
-def check_meta(meta: Mapping[str, Any]) -> None:
-    """Refuse settings that no game has.
-
-    Raises:
-        TraceError: names the setting, and what it should be.
-    """
+def _check_settings(meta: Mapping[str, Any]) -> None:
+    """Refuse settings that no game has."""
     for name, (is_right, words) in _SETTINGS.items():
         if name in meta and not is_right(meta[name]):
             raise TraceError(f"the record's {name} is {_short(meta[name])}; it should be {words}")
@@ -258,56 +196,32 @@ def check_meta(meta: Mapping[str, Any]) -> None:
         raise TraceError(f"the record's shielded names {', '.join(sorted(map(_short, strangers)))}, no boat of it")
 
 
-def check_kinds(record: Mapping[str, np.ndarray], kinds: Mapping[str, Any]) -> None:
-    """Refuse arrays of another kind than is written, such as text for numbers.
-
-    Raises:
-        TraceError: there is one.
-    """
-    for name, kind in kinds.items():
-        if not np.can_cast(record[name].dtype, kind, "same_kind"):
-            raise TraceError(f"the record's {name} holds {record[name].dtype}, expected {np.dtype(kind)}")
-
-
-def check_places(record: Mapping[str, np.ndarray]) -> None:
-    """Refuse positions that are in no field.
-
-    Raises:
-        TraceError: there is one further than `FARTHEST_M`.
-    """
-    for name in ("position", "flag_position"):
-        if record[name].size and float(np.abs(record[name]).max()) > FARTHEST_M:
-            raise TraceError(f"the record's {name} is over {FARTHEST_M / 1e3:g} km away; give positions in m")
-
-
 def _short(value: Any) -> str:
     text = repr(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def _number(low: float, high: float, above: bool = False) -> Test:
-    def is_right(value: Any) -> bool:
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            return False
-        return (low < value if above else low <= value) and value <= high
+Test = Callable[[Any], bool]
 
-    return is_right
+
+def _number(low: float, high: float) -> Test:
+    return lambda value: isinstance(value, int | float) and not isinstance(value, bool) and low <= value <= high
 
 
 def _list_of(test: Test, low: int = 0, high: int = MOST_BOATS) -> Test:
     return lambda value: isinstance(value, list) and low <= len(value) <= high and all(map(test, value))
 
 
-def _text(value: Any) -> bool:
-    return isinstance(value, str) and len(value) <= MOST_LETTERS
-
-
 def _maybe(test: Test) -> Test:
     return lambda value: value is None or test(value)
 
 
-def _seed(value: Any) -> bool:
-    return value is None or (isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**64)
+def _text(value: Any) -> bool:
+    return isinstance(value, str) and len(value) <= MOST_LETTERS
+
+
+def _whole(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**64
 
 
 def _policies(value: Any) -> bool:
@@ -324,17 +238,16 @@ def _obstacles(value: Any) -> bool:
     return _list_of(_circle)(value.get("circle", [])) and _list_of(_list_of(_point, 3))(value.get("polygon", []))
 
 
-_place = _number(-FARTHEST_M, FARTHEST_M)
-_radius = _number(0.0, FARTHEST_M)
-_point = _list_of(_place, 2, 2)
-_team = _list_of(lambda side: side in (0, 1) and not isinstance(side, bool))
+_radius, _length = _number(0.0, FARTHEST_M), _number(np.nextafter(0.0, 1.0), FARTHEST_M)
+_point = _list_of(_number(-FARTHEST_M, FARTHEST_M), 2, 2)
 
+_OPTIONAL = ("scrimmage", "decision_steps", "corner_radius_m", "title", "obstacles")
 _SETTINGS: dict[str, tuple[Test, str]] = {
     "dt_s": (_number(1e-3, LONGEST_STEP_S), f"a step of 0.001 to {LONGEST_STEP_S:g} s"),
-    "env_bounds_m": (_list_of(_number(0.0, FARTHEST_M, above=True), 2, 2), "a width and a height above 0, m"),
+    "env_bounds_m": (_list_of(_length, 2, 2), "a width and a height above 0, m"),
     "team_size": (_number(1, MOST_BOATS), "a number of boats"),
     "agent_ids": (_list_of(_text, 1), "a list of names"),
-    "team": (_team, "0 or 1 for each boat"),
+    "team": (_list_of(lambda side: _whole(side) and side in (0, 1)), "0 or 1 for each boat"),
     "flag_home": (_list_of(_point, 2, 2), "two points, m"),
     "scrimmage": (_maybe(_list_of(_point, 2, 2)), "two points, m"),
     "catch_radius_m": (_radius, "a radius, m"),
@@ -342,14 +255,17 @@ _SETTINGS: dict[str, tuple[Test, str]] = {
     "corner_radius_m": (_radius, "a radius, m"),
     "flag_keepout_m": (_radius, "a radius, m"),
     "agent_radius_m": (lambda value: _radius(value) or _list_of(_radius)(value), "a radius, or one for each boat, m"),
-    "separation_m": (_number(0.0, FARTHEST_M, above=True), "a radius above 0, m"),
+    "separation_m": (_length, "a radius above 0, m"),
     "preset": (_maybe(_text), "a name"),
     "title": (_maybe(_text), "a name"),
     "policies": (_policies, "names for blue and red"),
     "shielded": (_list_of(_text), "a list of names"),
-    "seed": (_seed, "a whole number"),
+    "seed": (_maybe(_whole), "a whole number"),
     "reason_names": (_list_of(_text), "a list of names"),
     "platforms": (_list_of(_text), "a list of names"),
     "obstacles": (_maybe(_obstacles), "circles and polygons"),
 }
 """Setting: what makes it right, and words for it."""
+
+META_KEYS = tuple(name for name in _SETTINGS if name not in _OPTIONAL)
+"""Keys that ``meta`` must have; further keys are kept."""

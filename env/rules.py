@@ -61,10 +61,7 @@ def check_grabs(rules: Rules, games: Games, first: int, last: int) -> None:
 
 @lean_kernel
 def _first_in_reach(state: Array, on_side: BoolArray, is_tagged: BoolArray, i: int, first: int, reach_m: float) -> int:
-    """The first untagged opponent of boat ``i`` on the wrong side within reach, -1 for none.
-
-    ``state`` (n, N_STATE), ``on_side`` and ``is_tagged`` (n,) are those of one game; opponents count from ``first``.
-    """
+    """The first untagged opponent of boat ``i``, from ``first`` on, on the wrong side within reach, -1 for none."""
     for j in range(first, first + state.shape[0] // 2):
         if not on_side[j] and not is_tagged[j] and is_within(state[j], state[i], reach_m):
             return j

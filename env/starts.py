@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from steerclear.shield.exceptions import GameError
-from steerclear.shield.jit import Array, BoolArray, copy_row, kernel
+from steerclear.shield.jit import Array, BoolArray, kernel
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.usv import wrap_degrees
 
@@ -63,11 +63,7 @@ def place_is_free(rules: Rules, games: Games, b: int, i: int, x: float, y: float
 
 @kernel
 def draw_place(rules: Rules, games: Games, b: int, i: int, side: int, placed: BoolArray) -> bool:
-    """Put boat ``i`` on a random free place; ``side`` is the team whose side it must lie on, -1 for anywhere.
-
-    Returns:
-        False when no free place was found.
-    """
+    """Put boat ``i`` on a random free place, if any, on the side of team ``side`` or, with -1, anywhere."""
     radius = rules.agent_radius[i]
     for _ in range(MAX_TRIES):
         x = radius + next_uniform(games.rng, b) * (rules.size[0] - 2.0 * radius)
@@ -87,36 +83,16 @@ def heading_to_scrimmage(rules: Rules, x: float, y: float) -> float:
     return heading_to(px - x, py - y)
 
 
-@kernel
-def clear_game(rules: Rules, games: Games, b: int) -> None:
-    """Scores, flags, counters and clocks of game ``b`` as at the start of a game."""
-    for i in range(rules.n_boats):
-        games.state[b, i] = 0.0
-        games.state[b, i, L.SPEED_ERROR] = np.nan
-        games.state[b, i, L.HEADING_ERROR] = np.nan
-        games.error_is_float32[b, i] = False
-        games.is_tagged[b, i] = False
-        games.is_disabled[b, i] = False
-        games.has_flag[b, i] = False
-        games.oob[b, i] = False
-        games.driven[b, i] = False
-        games.tagging_cooldown_s[b, i] = rules.cooldown
-        games.made_tag[b, i] = -1
-        games.collisions[b, i] = 0
-        games.new_collisions[b, i] = 0
-        games.contacts[b, i] = 0
-    games.touching[b] = False
-    games.contact[b] = False
-    for team in range(2):
-        copy_row(games.flag_position[b, team], rules.flag_home[team])
-    games.flag_taken[b] = False
-    games.captures[b] = 0
-    games.grabs[b] = 0
-    games.tags[b] = 0
-    games.events[b] = 0
-    games.time_s[b] = 0.0
-    games.terminated[b] = False
-    games.truncated[b] = False
+def clear_games(rules: Rules, games: Games, chosen: Any) -> None:
+    """Scores, flags, counters and clocks of games, a mask or a number, as at the start of a game."""
+    for name in Games._fields:
+        if name != "rng":
+            getattr(games, name)[chosen] = 0
+    for column in (L.SPEED_ERROR, L.HEADING_ERROR):
+        games.state[chosen, :, column] = np.nan
+    games.tagging_cooldown_s[chosen] = rules.cooldown
+    games.made_tag[chosen] = -1
+    games.flag_position[chosen] = rules.flag_home
 
 
 @kernel
@@ -139,19 +115,11 @@ def _find_place(
 
 @kernel
 def start_game(rules: Rules, games: Games, b: int, places: Array, given: Array, random: bool, own_side: bool) -> bool:
-    """Place every boat of game ``b`` (already cleared, carriers already marked).
+    """Place every boat of game ``b`` (already cleared, carriers already marked); False when one found no place.
 
-    Args:
-        rules: the rules.
-        games: the games.
-        b: which game.
-        places: (n, 2) fixed places, m; a boat whose place is not free gets a random one on its own side.
-        given: (n, 4) x m, y m, speed m/s and heading deg that the caller wants; NaN where it does not care.
-        random: ignore ``places``; positions, speeds and headings are random.
-        own_side: random places lie on the own side.
-
-    Returns:
-        False when a boat found no place.
+    A boat whose place of the fixed ``places`` (n, 2), m, is not free gets a random one on its own side. ``given``
+    (n, 4) is x m, y m, speed m/s and heading deg that the caller wants, NaN where it does not care. With ``random``
+    positions, speeds and headings are random, with ``own_side`` on the own side.
     """
     placed = np.zeros(rules.n_boats, np.bool_)
     for i in range(rules.n_boats):
@@ -175,11 +143,6 @@ def start_game(rules: Rules, games: Games, b: int, places: Array, given: Array, 
     return True
 
 
-def crowded_field_error() -> GameError:
-    """The error for boats that do not fit into the field."""
-    return GameError("no free start place was found; use a larger field, fewer boats or smaller obstacles")
-
-
 @kernel
 def settle(rules: Rules, games: Games, b: int) -> None:
     """After placing: sides, last positions, and the grabs, tags and untags that the places themselves cause."""
@@ -196,10 +159,8 @@ def settle(rules: Rules, games: Games, b: int) -> None:
 
 
 @kernel
-def start_where_seen(rules: Rules, games: Games, seen: Array) -> None:
-    """Start every game with its boats where they are: ``seen`` (B, n, 4) as in `motion.place_boats`."""
+def _start_where_seen(rules: Rules, games: Games, seen: Array) -> None:
     for b in range(games.state.shape[0]):
-        clear_game(rules, games, b)
         for i in range(rules.n_boats):
             see_boat(games.state[b, i], seen[b, i])
         check_bounds(rules, games, b, b + 1)
@@ -207,12 +168,17 @@ def start_where_seen(rules: Rules, games: Games, seen: Array) -> None:
         plan_power_plays(rules, games, b)
 
 
+def start_where_seen(rules: Rules, games: Games, seen: Array) -> None:
+    """Start every game with its boats where they are: ``seen`` (B, n, 4) as in `motion.place_boats`."""
+    clear_games(rules, games, slice(None))
+    _start_where_seen(rules, games, seen)
+
+
 @kernel
 def _start_games(rules: Rules, games: Games, chosen: BoolArray, places: Array, random: bool, own_side: bool) -> bool:
     nothing_given = np.full((rules.n_boats, 4), np.nan)
     for b in range(chosen.shape[0]):
         if chosen[b]:
-            clear_game(rules, games, b)
             if not start_game(rules, games, b, places, nothing_given, random, own_side):
                 return False
             settle(rules, games, b)
@@ -221,27 +187,27 @@ def _start_games(rules: Rules, games: Games, chosen: BoolArray, places: Array, r
 
 
 def reset_games(rules: Rules, games: Games, chosen: BoolArray, places: Array, config: GameConfig) -> None:
-    """Start the chosen games anew; ``places`` (n, 2) m are the fixed start places.
-
-    Raises:
-        GameError: a boat found no free place.
-    """
+    """Start the chosen games anew; ``places`` (n, 2) m are the fixed start places."""
+    clear_games(rules, games, chosen)
     if not _start_games(rules, games, chosen, places, not config.default_start, config.on_side_start):
-        raise crowded_field_error()
+        raise GameError(_CROWDED)
 
 
-PER_BOAT = (
-    "agent_position",
-    "agent_speed",
-    "agent_heading",
-    "agent_has_flag",
-    "agent_is_tagged",
-    "agent_tagging_cooldown",
-    "agent_collisions",
-)
-PER_TEAM = ("captures", "tags", "grabs")
-POWER_PLAYS = ("power_play_start", "power_play_boats")
-KEYS = (*PER_BOAT, "agent_pos_unit", *PER_TEAM, *POWER_PLAYS)
+_CROWDED = "no free start place was found; use a larger field, fewer boats or smaller obstacles"
+
+PER_BOAT = {
+    "agent_position": 2,
+    "agent_speed": 1,
+    "agent_heading": 1,
+    "agent_has_flag": 1,
+    "agent_is_tagged": 1,
+    "agent_tagging_cooldown": 1,
+    "agent_collisions": 1,
+}
+"""What may be given of boats, and how many numbers it is."""
+
+PER_TEAM = ("captures", "tags", "grabs", "power_play_start")
+KEYS = (*PER_BOAT, "agent_pos_unit", *PER_TEAM, "power_play_boats")
 
 
 def start_from(config: GameConfig, rules: Rules, games: Games, b: int, places: Array, init: Mapping[str, Any]) -> None:
@@ -265,92 +231,63 @@ def start_from(config: GameConfig, rules: Rules, games: Games, b: int, places: A
     for key in init:
         if key not in KEYS:
             near = difflib.get_close_matches(str(key), KEYS, n=1)
-            raise GameError(
-                f"unknown init_dict key {key!r}; {f'did you mean {near[0]}?' if near else f'known: {KEYS}'}"
-            )
+            hint = f"did you mean {near[0]}?" if near else f"known: {KEYS}"
+            raise GameError(f"unknown init_dict key {key!r}; {hint}")
     if init.get("agent_pos_unit", "m") not in ("m", None):
         raise GameError(f"agent_pos_unit is {init['agent_pos_unit']!r}; only 'm' (metres from the lower left) exists")
-    boats = {key: _per_boat(config, key, init[key]) for key in PER_BOAT if key in init}
-    teams = {key: _per_team(key, init[key]) for key in PER_TEAM if key in init}
-    given = _wanted_places(config, boats)
-    carries = np.nan_to_num(boats.get("agent_has_flag", np.zeros(config.n_boats))) != 0.0
-    _check_carriers(config, rules, carries, given)
+    n, ids = config.n_boats, config.agent_ids
+    boats = {key: np.full((n, width), np.nan) for key, width in PER_BOAT.items()}
+    boats |= {key: _rows(key, init[key], ids, PER_BOAT[key], _boat_number) for key in PER_BOAT if key in init}
+    teams = {key: _counts(key, init[key]) for key in PER_TEAM if key in init}
+    drawn = _power_play_boats(config, init["power_play_boats"]) if "power_play_boats" in init else None
+    one = {key: rows[:, 0] for key, rows in boats.items()}
+    given = np.column_stack([boats["agent_position"], one["agent_speed"], one["agent_heading"]])
+    carries = np.nan_to_num(one["agent_has_flag"]) != 0.0
     taken = np.array([carries[rules.team == 1].any(), carries[rules.team == 0].any()])
+    _check_carriers(config, rules, carries, given)
     _check_places(config, rules, taken, given)
-    clear_game(rules, games, b)
-    games.has_flag[b] = carries
-    games.flag_taken[b] = taken
+    clear_games(rules, games, b)
+    games.has_flag[b], games.flag_taken[b] = carries, taken
     if not start_game(rules, games, b, places, given, not config.default_start, config.on_side_start):
-        raise crowded_field_error()
-    _set_counters(rules, games, b, boats, teams)
+        raise GameError(_CROWDED)
+    games.is_tagged[b] = np.nan_to_num(one["agent_is_tagged"]) != 0.0
+    elapsed_s = np.nan_to_num(one["agent_tagging_cooldown"], nan=rules.cooldown)
+    games.tagging_cooldown_s[b] = np.clip(elapsed_s, 0.0, rules.cooldown)
+    games.collisions[b] = np.nan_to_num(one["agent_collisions"]).astype(np.int64)
+    for name in ("captures", "tags", "grabs"):
+        getattr(games, name)[b] = teams.get(name, 0)
     settle(rules, games, b)
     plan_power_plays(rules, games, b)
-    _set_power_plays(config, games, b, init)
+    if "power_play_start" in teams:
+        games.power_start[b] = teams["power_play_start"]
+    if drawn is not None:
+        games.power_boats[b] = drawn
 
 
-def _set_power_plays(config: GameConfig, games: Games, b: int, init: Mapping[str, Any]) -> None:
-    """Put given power plays in the place of those drawn: decisions (blue, red), and the boats they disable."""
-    if "power_play_start" in init:
-        games.power_start[b] = _per_team("power_play_start", init["power_play_start"])
-    if "power_play_boats" not in init:
-        return
-    try:
-        boats = np.asarray(init["power_play_boats"], dtype=np.float64)
-        boats = np.broadcast_to(boats.reshape(2, -1), (2, 2))
-    except (TypeError, ValueError):
-        boats = np.full((2, 2), np.nan)
-    teams = np.arange(2)[:, None] * config.team_size
-    if not ((boats == np.floor(boats)) & (boats >= teams) & (boats < teams + config.team_size)).all():
-        raise GameError(
-            f"power_play_boats is {init['power_play_boats']!r}; give the number of a blue and of a red boat"
-        )
-    games.power_boats[b] = boats
-
-
-def _set_counters(rules: Rules, games: Games, b: int, boats: dict[str, Array], teams: dict[str, Array]) -> None:
-    if "agent_is_tagged" in boats:
-        games.is_tagged[b] = np.nan_to_num(boats["agent_is_tagged"]) != 0.0
-    if "agent_tagging_cooldown" in boats:
-        elapsed = boats["agent_tagging_cooldown"]
-        games.tagging_cooldown_s[b] = np.clip(np.where(np.isnan(elapsed), rules.cooldown, elapsed), 0.0, rules.cooldown)
-    if "agent_collisions" in boats:
-        games.collisions[b] = np.nan_to_num(boats["agent_collisions"]).astype(np.int64)
-    for name, values in teams.items():
-        getattr(games, name)[b] = values
-
-
-def _per_boat(config: GameConfig, key: str, value: Any) -> Array:
-    """One row per boat, NaN for boats that are not named; positions (n, 2), everything else (n,)."""
-    width = 2 if key == "agent_position" else 1
-    rows = np.full((config.n_boats, width), np.nan)
+def _rows(key: str, value: Any, names: Sequence[Any], width: int, number: Callable[..., int]) -> Array:
+    """One row of numbers per boat or team of ``names``, NaN for those a dict does not name: (n, width)."""
+    rows = np.full((len(names), width), np.nan)
     if isinstance(value, Mapping):
-        for agent_id, entry in value.items():
-            if agent_id not in config.agent_ids:
-                raise GameError(f"{key}: unknown agent {agent_id!r}; agents are {', '.join(config.agent_ids)}")
-            rows[config.agent_ids.index(agent_id)] = _numbers(key, entry, width)
-    else:
-        entries = list(value) if isinstance(value, (list, tuple, np.ndarray)) else []
-        if len(entries) != config.n_boats:
-            raise GameError(f"{key} is {value!r}; give {config.n_boats} entries in boat order, or a dict by agent id")
-        for i, entry in enumerate(entries):
-            rows[i] = _numbers(key, entry, width)
-    return rows if width == 2 else rows[:, 0]
+        for name, entry in value.items():
+            rows[number(key, name, names)] = _numbers(key, entry, width)
+        return rows
+    entries = list(value) if isinstance(value, (list, tuple, np.ndarray)) else []
+    if len(entries) != len(names):
+        order = "in boat order, or a dict by agent id" if len(names) != 2 else "in order, or a dict"
+        raise GameError(f"{key} is {value!r}; give {len(names)} entries {order}")
+    for row, entry in zip(rows, entries, strict=True):
+        row[:] = _numbers(key, entry, width)
+    return rows
 
 
-def _per_team(key: str, value: Any) -> Array:
-    """Counts (2,), blue then red; a dict may be keyed by any team whose ``int`` is 0 or 1."""
-    counts = np.zeros(2)
-    if isinstance(value, Mapping):
-        for team, entry in value.items():
-            counts[_team_number(key, team)] = _numbers(key, entry, 1)[0]
-    else:
-        counts[:] = _numbers(key, value, 2)
-    if (counts < 0).any():
-        raise GameError(f"{key} is {value!r}; counts are >= 0")
-    return counts.astype(np.int64)
+def _boat_number(key: str, agent_id: Any, ids: Sequence[str]) -> int:
+    if agent_id not in ids:
+        raise GameError(f"{key}: unknown agent {agent_id!r}; agents are {', '.join(ids)}")
+    return ids.index(agent_id)
 
 
-def _team_number(key: str, team: Any) -> int:
+def _team_number(key: str, team: Any, _: Sequence[int]) -> int:
+    """0 or 1, of any team whose ``int`` is that."""
     try:
         number = int(team)
     except (TypeError, ValueError):
@@ -370,18 +307,29 @@ def _numbers(key: str, value: Any, width: int) -> Array:
     return numbers
 
 
-def _wanted_places(config: GameConfig, boats: dict[str, Array]) -> Array:
-    given = np.full((config.n_boats, 4), np.nan)
-    if "agent_position" in boats:
-        given[:, :2] = boats["agent_position"]
-    if "agent_speed" in boats:
-        given[:, 2] = boats["agent_speed"]
-    if "agent_heading" in boats:
-        given[:, 3] = boats["agent_heading"]
-    return given
+def _counts(key: str, value: Any) -> Array:
+    """Counts (2,) of blue and red, 0 where a dict names none."""
+    counts = np.nan_to_num(_rows(key, value, (0, 1), 1, _team_number)[:, 0])
+    if (counts < 0).any():
+        raise GameError(f"{key} is {value!r}; counts are >= 0")
+    return counts.astype(np.int64)
+
+
+def _power_play_boats(config: GameConfig, value: Any) -> Array:
+    """The boats (2, 2) that the power plays of each team disable."""
+    try:
+        boats = np.asarray(value, dtype=np.float64)
+        boats = np.broadcast_to(boats.reshape(2, -1), (2, 2))
+    except (TypeError, ValueError):
+        boats = np.full((2, 2), np.nan)
+    first = np.arange(2)[:, None] * config.team_size
+    if not ((boats == np.floor(boats)) & (boats >= first) & (boats < first + config.team_size)).all():
+        raise GameError(f"power_play_boats is {value!r}; give the number of a blue and of a red boat")
+    return boats
 
 
 def _check_carriers(config: GameConfig, rules: Rules, carries: np.ndarray, given: Array) -> None:
+    """At most one boat of a team carries a flag, and none on its own side."""
     for team in (0, 1):
         if carries[rules.team == team].sum() > 1:
             raise GameError("agent_has_flag: at most one boat of a team can carry the opponents' flag")
@@ -390,21 +338,18 @@ def _check_carriers(config: GameConfig, rules: Rules, carries: np.ndarray, given
             raise GameError(f"{config.agent_ids[i]} carries a flag but is on its own side; place it on the other side")
 
 
-def _point(place: Array) -> str:
-    return f"({place[0]:g}, {place[1]:g})"
-
-
 def _check_places(config: GameConfig, rules: Rules, taken: np.ndarray, given: Array) -> None:
     """Given places must lie inside the field, clear of obstacles and of flags that are home, no two on one point."""
     for i in np.flatnonzero(~np.isnan(given[:, 0])):
-        name, place, radius = config.agent_ids[i], given[i, :2], config.agent_radius_m[i]
+        place, radius = given[i, :2], config.agent_radius_m[i]
+        here = f"{config.agent_ids[i]} at ({place[0]:g}, {place[1]:g})"
         if not ((place > radius) & (place < rules.size - radius)).all():
-            raise GameError(f"{name} at {_point(place)} is not inside the field {_point(rules.size)}; move it inside")
+            raise GameError(f"{here} is not inside the field ({rules.size[0]:g}, {rules.size[1]:g}); move it inside")
         if touches_obstacle(rules.obstacles, place[0], place[1], radius):
-            raise GameError(f"{name} at {_point(place)} touches an obstacle; move it away")
+            raise GameError(f"{here} touches an obstacle; move it away")
         for flag in (0, 1):
             if not taken[flag] and np.hypot(*(place - rules.flag_home[flag])) <= rules.flag_keepout:
-                raise GameError(f"{name} at {_point(place)} is on a flag's home; move it {rules.flag_keepout} m away")
+                raise GameError(f"{here} is on a flag's home; move it {rules.flag_keepout} m away")
         for j in range(i):
             if (given[j, :2] == place).all():
-                raise GameError(f"{config.agent_ids[j]} and {name} are on one point {_point(place)}; move one")
+                raise GameError(f"{config.agent_ids[j]} and {here} are on one point; move one")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -28,10 +28,12 @@ def check_real(
     return number
 
 
-def check_count(name: str, value: Any, low: int) -> int:
-    """A whole number ``>= low``."""
+def check_count(name: str, value: Any, low: int, high: int | None = None) -> int:
+    """A whole number ``>= low`` and ``<= high`` where given."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < low:
         raise ConfigError(f"{name} is {value!r}; give a whole number >= {low}")
+    if high is not None and value > high:
+        raise ConfigError(f"{name} is {value}; give at most {high}")
     return int(value)
 
 
@@ -54,12 +56,10 @@ def check_point(name: str, value: Any) -> tuple[float, float]:
 def check_segment(name: str, value: Any) -> tuple[tuple[float, float], tuple[float, float]]:
     """Two different points."""
     points = list(value) if isinstance(value, Iterable) and not isinstance(value, str) else []
-    if len(points) != 2:
+    ends = tuple(check_point(name, point) for point in points) if len(points) == 2 else ()
+    if len(set(ends)) != 2:
         raise ConfigError(f"{name} is {value!r}; give two different points ((x, y), (x, y))")
-    start, end = check_point(name, points[0]), check_point(name, points[1])
-    if start == end:
-        raise ConfigError(f"{name} is {value!r}; give two different points ((x, y), (x, y))")
-    return start, end
+    return ends[0], ends[1]
 
 
 def per_boat(name: str, value: Any, n_boats: int, kinds: tuple[type, ...]) -> tuple[Any, ...]:
@@ -74,26 +74,24 @@ def per_boat(name: str, value: Any, n_boats: int, kinds: tuple[type, ...]) -> tu
     raise ConfigError(f"{name} is {value!r}; give one value, or one per boat ({n_boats})")
 
 
-def check_circles(circles: Any) -> tuple[tuple[float, tuple[float, float]], ...]:
-    """Circle obstacles as (radius, (x, y)), m."""
-    checked = []
-    for entry in _entries("circle", circles):
+def check_obstacles(value: Any) -> dict[str, tuple[Any, ...]]:
+    """Circles (radius, (x, y)) and polygons of at least three different corners (x, y), m, by kind; None has none."""
+    if value is None:
+        value = {}
+    if not isinstance(value, Mapping) or set(value) - {"circle", "polygon"}:
+        raise ConfigError(f"obstacles is {value!r}; give a dict with the keys 'circle' and 'polygon' only")
+    checked: dict[str, list[Any]] = {"circle": [], "polygon": []}
+    for entry in _entries("circle", value.get("circle") or ()):
         if len(entry) != 2:
             raise ConfigError(f"circle obstacle {entry!r}: give (radius, (x, y))")
         radius = check_real("circle obstacle radius", entry[0], above=0.0)
-        checked.append((radius, check_point("circle obstacle centre", entry[1])))
-    return tuple(checked)
-
-
-def check_polygons(polygons: Any) -> tuple[tuple[tuple[float, float], ...], ...]:
-    """Polygon obstacles as sequences of at least three different corners (x, y), m."""
-    checked = []
-    for entry in _entries("polygon", polygons):
+        checked["circle"].append((radius, check_point("circle obstacle centre", entry[1])))
+    for entry in _entries("polygon", value.get("polygon") or ()):
         corners = tuple(check_point("polygon obstacle corner", corner) for corner in entry)
         if len(set(corners)) < 3 or len(set(corners)) != len(corners):
             raise ConfigError(f"polygon obstacle {entry!r}: give at least 3 corners, each once")
-        checked.append(corners)
-    return tuple(checked)
+        checked["polygon"].append(corners)
+    return {kind: tuple(shapes) for kind, shapes in checked.items()}
 
 
 def _entries(kind: str, value: Any) -> list[Any]:

@@ -81,11 +81,7 @@ def view_game(config: GameConfig, rules: Rules, games: Games, b: int) -> GameVie
 
 
 def restore_game(rules: Rules, games: Games, b: int, view: GameView) -> None:
-    """Make game ``b`` stand as a view says; what a view does not hold (random numbers, who touches whom) stays.
-
-    Raises:
-        GameError: an array of the view has another shape.
-    """
+    """Make game ``b`` stand as a view says; what a view does not hold (random numbers, who touches whom) stays."""
     for name in _COPIED:
         target, given = getattr(games, name)[b], np.asarray(getattr(view, name))
         if given.shape != target.shape:

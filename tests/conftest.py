@@ -7,8 +7,7 @@ import sys
 import numpy as np
 import pytest
 from steerclear.env.config import GameConfig
-from steerclear.env.record import find_breaches, make_record
-from steerclear.env.record_meta import meta_of
+from steerclear.env.record import find_breaches, make_record, meta_of
 
 REASONS = ["PASSED", "QP", "QP_RELAXED", "BACKUP", "BEST_EFFORT", "HELD", "NOT_COVERED", "RIGHT_OF_WAY"]
 

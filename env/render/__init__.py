@@ -13,20 +13,16 @@ os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # else importing pygam
 
 if TYPE_CHECKING:
     from steerclear.env.render.animation import save_animation, save_frame
+    from steerclear.env.render.canvas import THEMES
     from steerclear.env.render.renderer import MODES, Picture, Renderer
-    from steerclear.env.render.scene import THEMES, Arena, Overlay, Scene
+    from steerclear.env.render.scene import Arena, Overlay, Scene
 
 __all__ = ["MODES", "THEMES", "Arena", "Overlay", "Picture", "Renderer", "Scene", "save_animation", "save_frame"]
 _HOME = {
-    "MODES": "renderer",
-    "Renderer": "renderer",
-    "THEMES": "scene",
-    "Arena": "scene",
-    "Overlay": "scene",
-    "Scene": "scene",
-    "Picture": "renderer",
-    "save_animation": "animation",
-    "save_frame": "animation",
+    "animation": ("save_animation", "save_frame"),
+    "canvas": ("THEMES",),
+    "renderer": ("MODES", "Picture", "Renderer"),
+    "scene": ("Arena", "Overlay", "Scene"),
 }
 
 
@@ -36,9 +32,10 @@ def __getattr__(name: str) -> Any:
     Raises:
         ConfigError: what it draws with is not installed; the message names the extra.
     """
-    if name not in _HOME:
+    home = next((module for module, names in _HOME.items() if name in names), None)
+    if home is None:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     try:
-        return getattr(import_module(f".{_HOME[name]}", __name__), name)
+        return getattr(import_module(f".{home}", __name__), name)
     except ModuleNotFoundError as error:
         raise missing(error, f"{__name__}.{name}") or error from error

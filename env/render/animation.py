@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 from steerclear.env.record_file import read_meta, validate
+from steerclear.env.render.canvas import mix
 from steerclear.env.render.renderer import Picture, pixels
-from steerclear.env.render.scene import Arena, Scene, mix
+from steerclear.env.render.scene import Arena, Scene
 from steerclear.env.whole_file import whole_file
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.extras import missing
@@ -88,41 +89,32 @@ def save_animation(
     if not (0.0 < fps <= 100.0 and speedup > 0.0):
         raise ConfigError(f"fps is {fps} and speedup {speedup}; choose 0 < fps <= 100 and speedup > 0.")
     picture, states = _picture_of(record, width_px, theme)
-    steps = _steps_shown(states, picture.arena.dt_s, fps, speedup, start_s, end_s)
-    frames = _frames(record, picture, steps, progress)
-    with whole_file(target, ConfigError) as part:
-        if target.suffix.lower() == ".gif":
-            _write_gif(part, frames, picture, fps)
-        else:
-            _write_mp4(part, frames, picture.size_px, fps)
-    return target
-
-
-def _picture_of(record: Mapping[str, np.ndarray], width_px: int, theme: str) -> tuple[Picture, int]:
-    """Return a picture for the record and the number of its states."""
-    validate(record)
-    return Picture(Arena.from_meta(read_meta(record)), width_px, theme), len(record["position"])
-
-
-def _steps_shown(
-    states: int, dt_s: float, fps: float, speedup: float, start_s: float, end_s: float | None
-) -> np.ndarray:
-    """Return the steps to draw, evenly spaced in time."""
+    dt_s = picture.arena.dt_s
     last_s = (states - 1) * dt_s
     end_s = last_s if end_s is None else min(end_s, last_s)
     if not 0.0 <= start_s <= end_s:
         raise ConfigError(f"cannot show {start_s} s to {end_s} s; the record lasts from 0 to {last_s:.1f} s.")
     times_s = np.arange(start_s, end_s + 1e-9, speedup / fps)
-    return np.minimum(np.round(times_s / dt_s).astype(int), states - 1)
+    steps = np.minimum(np.round(times_s / dt_s).astype(int), states - 1)
+
+    def frames() -> Iterator[np.ndarray]:
+        for done, step in enumerate(steps, start=1):
+            yield pixels(picture.draw(Scene.from_record(record, int(step), dt_s)))
+            if progress is not None:
+                progress(done, len(steps))
+
+    with whole_file(target, ConfigError) as part:
+        if target.suffix.lower() == ".gif":
+            _write_gif(part, frames(), picture, fps)
+        else:
+            _write_mp4(part, frames(), picture.size_px, fps)
+    return target
 
 
-def _frames(
-    record: Mapping[str, np.ndarray], picture: Picture, steps: np.ndarray, progress: Progress | None
-) -> Iterator[np.ndarray]:
-    for done, step in enumerate(steps, start=1):
-        yield pixels(picture.draw(Scene.from_record(record, int(step), picture.arena.dt_s)))
-        if progress is not None:
-            progress(done, len(steps))
+def _picture_of(record: Mapping[str, np.ndarray], width_px: int, theme: str) -> tuple[Picture, int]:
+    """A picture for the record and the number of its states."""
+    validate(record)
+    return Picture(Arena.from_meta(read_meta(record)), width_px, theme), len(record["position"])
 
 
 def _write_mp4(path: Path, frames: Iterator[np.ndarray], size_px: tuple[int, int], fps: float) -> None:
@@ -152,7 +144,7 @@ def _write_gif(path: Path, frames: Iterator[np.ndarray], picture: Picture, fps: 
 
 
 def _palette(picture: Picture) -> list[int]:
-    """Return 256 colours: the theme's, the commonest of the still field, and steps between marks and water."""
+    """256 colours: the theme's, the commonest of the still field, and steps between marks and water."""
     theme = picture.theme
     marks = [*theme.team, theme.ink, theme.muted, theme.wanted, theme.changed, theme.breach]
     grounds = [*theme.water, theme.page, theme.plate]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
@@ -14,10 +15,67 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pygame
-from steerclear.env.render.scene import Colour
 
 OVERSAMPLE = 2
 Point = Sequence[float] | np.ndarray
+Colour = tuple[int, int, int]
+
+
+@dataclass(frozen=True)
+class Theme:
+    """One set of colours, red-green-blue 0..255."""
+
+    page: Colour  # Around the field
+    water: tuple[Colour, Colour]  # Field of team 0 and of team 1
+    grid: Colour  # Lines every 10 m
+    edge: Colour  # Border of the field and the scrimmage line
+    ink: Colour  # Text and strong marks
+    muted: Colour  # Secondary text
+    team: tuple[Colour, Colour]  # Team 0 and team 1
+    wanted: Colour  # Arrow of a nominal command the shield did not send
+    changed: Colour  # Arrow and halo of a command the shield changed
+    breach: Colour  # Two boats inside the separation radius
+    obstacle: Colour  # Fixed obstacles
+    plate: Colour  # Behind labels
+
+
+THEMES = {
+    "light": Theme(
+        page=(248, 250, 252),
+        water=((226, 238, 250), (251, 233, 229)),
+        grid=(255, 255, 255),
+        edge=(100, 116, 139),
+        ink=(15, 23, 42),
+        muted=(84, 98, 118),
+        team=((29, 92, 208), (206, 58, 48)),
+        wanted=(71, 85, 105),
+        changed=(240, 130, 0),
+        breach=(190, 24, 147),
+        obstacle=(120, 113, 108),
+        plate=(255, 255, 255),
+    ),
+    "dark": Theme(
+        page=(11, 18, 32),
+        water=((16, 38, 66), (56, 27, 36)),
+        grid=(38, 56, 84),
+        edge=(120, 140, 168),
+        ink=(236, 242, 250),
+        muted=(148, 163, 184),
+        team=((86, 156, 255), (255, 108, 96)),
+        wanted=(190, 202, 220),
+        changed=(255, 171, 46),
+        breach=(255, 92, 214),
+        obstacle=(148, 140, 132),
+        plate=(20, 30, 48),
+    ),
+}
+"""The themes by name."""
+
+
+def mix(first: Colour, second: Colour, share: float) -> Colour:
+    """Blend two colours; ``share`` 0 gives the first, 1 the second."""
+    red, green, blue = (round(a + (b - a) * share) for a, b in zip(first, second, strict=True))
+    return red, green, blue
 
 
 @lru_cache(maxsize=32)
@@ -53,12 +111,7 @@ class Canvas:
         """Return the picture at its own size."""
         return pygame.transform.smoothscale(self.surface, self.size_px)
 
-    def rectangle(self, lower_m: Point, upper_m: Point, colour: Colour) -> None:
-        """Fill the rectangle between two corners."""
-        (left, bottom), (right, top) = self._at(lower_m), self._at(upper_m)
-        pygame.draw.rect(self.surface, colour, (round(left), round(top), round(right - left), round(bottom - top)))
-
-    def polygon(self, points_m: Sequence[Point], colour: Colour, outline: Colour | None = None) -> None:
+    def polygon(self, points_m: Sequence[Point] | np.ndarray, colour: Colour, outline: Colour | None = None) -> None:
         """Fill a polygon, with a thin outline when one is given."""
         points = [self._at(point) for point in points_m]
         pygame.draw.polygon(self.surface, colour, points)
@@ -67,18 +120,11 @@ class Canvas:
 
     def disc(self, centre_m: Point, radius_m: float, colour: Colour, opacity: float = 1.0) -> None:
         """Fill a circle."""
-        radius = radius_m * self._scale
-        box, layer = self._layer(centre_m, radius + 2)
-        pygame.draw.circle(layer, (*colour, round(255 * opacity)), (box.width / 2, box.height / 2), radius)
-        self.surface.blit(layer, box)
+        self._circle(centre_m, radius_m * self._scale, colour, opacity, 0)
 
     def ring(self, centre_m: Point, radius_m: float, colour: Colour, width_px: float, opacity: float = 1.0) -> None:
         """Draw a circle's line."""
-        radius, width = radius_m * self._scale, max(1, round(width_px * OVERSAMPLE))
-        box, layer = self._layer(centre_m, radius + width + 2)
-        middle = (box.width / 2, box.height / 2)
-        pygame.draw.circle(layer, (*colour, round(255 * opacity)), middle, radius + width / 2, width)
-        self.surface.blit(layer, box)
+        self._circle(centre_m, radius_m * self._scale, colour, opacity, max(1, round(width_px * OVERSAMPLE)))
 
     def dashed_ring(self, centre_m: Point, radius_m: float, colour: Colour, width_px: float, dash_px: float) -> None:
         """Draw a circle's line in dashes."""
@@ -93,7 +139,7 @@ class Canvas:
         points = [self._at(point) for point in points_m]
         width = max(1.0, width_px * OVERSAMPLE)
         for start, end in pairwise(points):
-            self._bar(self.surface, start, end, width, colour)
+            _bar(self.surface, start, end, width, colour)
         if width >= 3:
             for point in points:
                 pygame.draw.circle(self.surface, colour, point, width / 2)
@@ -104,7 +150,7 @@ class Canvas:
         count = max(1, round(float(np.linalg.norm(end - start)) * self.scale_px_per_m / (2 * dash_px)))
         for k in range(count):
             first, last = start + (end - start) * k / count, start + (end - start) * (k + 0.5) / count
-            self._bar(self.surface, self._at(first), self._at(last), width_px * OVERSAMPLE, colour)
+            _bar(self.surface, self._at(first), self._at(last), width_px * OVERSAMPLE, colour)
 
     def trail(self, points_m: np.ndarray, colour: Colour, width_px: float) -> None:
         """Draw a track that fades towards its beginning."""
@@ -117,7 +163,7 @@ class Canvas:
         for k in range(1, len(points)):
             alpha = round(190 * (k / len(points)) ** 1.5)
             start, end = np.subtract(points[k - 1], corner), np.subtract(points[k], corner)
-            self._bar(layer, tuple(start), tuple(end), width_px * OVERSAMPLE, (*colour, alpha))
+            _bar(layer, tuple(start), tuple(end), width_px * OVERSAMPLE, (*colour, alpha))
         self.surface.blit(layer, tuple(corner))
 
     def arrow(self, start_m: Point, end_m: Point, colour: Colour, width_px: float, edge: Colour | None = None) -> None:
@@ -139,27 +185,26 @@ class Canvas:
     def _at(self, point_m: Point) -> tuple[float, float]:
         return self._origin[0] + point_m[0] * self._scale, self._origin[1] - point_m[1] * self._scale
 
-    def _layer(self, centre_m: Point, reach: float) -> tuple[pygame.Rect, pygame.Surface]:
-        """Return a see-through surface around a point and the place where it belongs."""
+    def _circle(self, centre_m: Point, radius: float, colour: Colour, opacity: float, width: int) -> None:
+        """Draw a see-through disc, or a ring of a width > 0."""
         x, y = self._at(centre_m)
-        half = math.ceil(reach)
+        half = math.ceil(radius + width + 2)
         box = pygame.Rect(round(x) - half, round(y) - half, 2 * half, 2 * half)
-        return box, pygame.Surface(box.size, pygame.SRCALPHA, 32)
+        layer = pygame.Surface(box.size, pygame.SRCALPHA, 32)
+        middle = (box.width / 2, box.height / 2)
+        pygame.draw.circle(layer, (*colour, round(255 * opacity)), middle, radius + width / 2, width)
+        self.surface.blit(layer, box)
 
-    @staticmethod
-    def _bar(
-        surface: pygame.Surface,
-        start: Sequence[float],
-        end: Sequence[float],
-        width: float,
-        colour: Sequence[int],
-    ) -> None:
-        """Draw a straight bar of any width; pygame's own thick lines have slanted ends."""
-        along_x, along_y = end[0] - start[0], end[1] - start[1]
-        length = math.hypot(along_x, along_y)
-        if length == 0.0:
-            return
-        x, y = -along_y / length * width / 2, along_x / length * width / 2
-        corners = [(start[0] + x, start[1] + y), (end[0] + x, end[1] + y)]
-        corners += [(end[0] - x, end[1] - y), (start[0] - x, start[1] - y)]
-        pygame.draw.polygon(surface, colour, corners)
+
+def _bar(
+    surface: pygame.Surface, start: Sequence[float], end: Sequence[float], width: float, colour: Sequence[int]
+) -> None:
+    """Draw a straight bar of any width; pygame's own thick lines have slanted ends."""
+    along_x, along_y = end[0] - start[0], end[1] - start[1]
+    length = math.hypot(along_x, along_y)
+    if length == 0.0:
+        return
+    x, y = -along_y / length * width / 2, along_x / length * width / 2
+    corners = [(start[0] + x, start[1] + y), (end[0] + x, end[1] + y)]
+    corners += [(end[0] - x, end[1] - y), (start[0] - x, start[1] - y)]
+    pygame.draw.polygon(surface, colour, corners)

@@ -1,4 +1,4 @@
-"""``Renderer`` shows a live game, in a window or as arrays."""
+"""``Picture`` draws a moment; ``Renderer`` shows a live game, in a window or as arrays."""
 
 from __future__ import annotations
 
@@ -12,12 +12,67 @@ import numpy as np
 import pygame
 from steerclear.env.config import GameConfig
 from steerclear.env.render.boats import draw_boats, draw_field
-from steerclear.env.render.canvas import Canvas
-from steerclear.env.render.panel import FOOTER_PX, HEADER_PX, draw_header, draw_labels, draw_legend
-from steerclear.env.render.scene import TRAIL_S, Arena, Overlay, Scene, get_theme
+from steerclear.env.render.canvas import THEMES, Canvas
+from steerclear.env.render.panel import FOOTER_PX, HEADER_PX, MARGIN_PX, draw_header, draw_labels, draw_legend
+from steerclear.env.render.scene import TRAIL_S, Arena, Overlay, Scene
 from steerclear.shield.exceptions import ConfigError
 
 MODES = ("human", "rgb_array")
+MIN_WIDTH_PX, MAX_WIDTH_PX = 320, 4096
+BLOCK_PX = 16
+"""Both sides are multiples of this, because video encoders work in such blocks."""
+
+UNSEEN = ("dummy", "offscreen")
+"""Drivers SDL falls back to where there is no display: windows open, and nobody sees them."""
+
+
+class Picture:
+    """Draws scenes of one arena.
+
+    Args:
+        arena: The field.
+        width_px: Width of the picture; the height follows from the field.
+        theme: "light" or "dark".
+
+    Raises:
+        ConfigError: The width or the theme cannot be used.
+    """
+
+    def __init__(self, arena: Arena, width_px: int = 1280, theme: str = "light") -> None:
+        if not MIN_WIDTH_PX <= width_px <= MAX_WIDTH_PX:
+            raise ConfigError(f"width_px is {width_px}; choose {MIN_WIDTH_PX} to {MAX_WIDTH_PX} pixels.")
+        if theme not in THEMES:
+            raise ConfigError(f"there is no theme {theme!r}; choose {' or '.join(THEMES)}.")
+        self.arena, self.theme = arena, THEMES[theme]
+        width_px = BLOCK_PX * round(width_px / BLOCK_PX)
+        inner_px = width_px - 2 * MARGIN_PX
+        scale = min(inner_px / arena.bounds_m[0], inner_px / arena.bounds_m[1])
+        field_px = arena.bounds_m[0] * scale, arena.bounds_m[1] * scale
+        height_px = BLOCK_PX * math.ceil((HEADER_PX + field_px[1] + FOOTER_PX) / BLOCK_PX)
+        self.size_px = (width_px, height_px)
+        self._canvas = Canvas(self.size_px, ((width_px - field_px[0]) / 2, HEADER_PX + field_px[1]), scale)
+        draw_field(self._canvas, arena, self.theme)
+        self._field = self._canvas.surface.copy()
+
+    def still(self) -> pygame.Surface:
+        """Return the field alone."""
+        self._canvas.surface.blit(self._field, (0, 0))
+        return self._canvas.finished()
+
+    def draw(self, scene: Scene, show_commands: bool = True) -> pygame.Surface:
+        """Return a surface of ``size_px`` with a moment, with its commands or without."""
+        self._canvas.surface.blit(self._field, (0, 0))
+        draw_boats(self._canvas, scene, self.arena, self.theme, show_commands)
+        surface = self._canvas.finished()
+        draw_labels(surface, self._canvas, scene, self.arena, self.theme)
+        draw_header(surface, scene, self.arena, self.theme)
+        draw_legend(surface, self.arena, self.theme)
+        return surface
+
+
+def pixels(surface: pygame.Surface) -> np.ndarray:
+    """Return a surface as (height, width, 3) uint8, red-green-blue."""
+    return np.ascontiguousarray(pygame.surfarray.array3d(surface).swapaxes(0, 1))
 
 
 class Renderer:
@@ -28,7 +83,7 @@ class Renderer:
         mode: One of ``MODES``.
         width_px: Width of the picture; the height follows from the field.
         theme: "light" or "dark".
-        show_commands: Draw wanted and sent commands when ``draw`` is given them.
+        show_commands: Draw nominal and filtered commands when ``draw`` is given them.
         speedup: In a window, how many times faster than real time to go at most; None does not wait. It may be
             changed at any time.
 
@@ -49,18 +104,16 @@ class Renderer:
             raise ConfigError(f"there is no render mode {mode!r}; choose {' or '.join(MODES)}.")
         if speedup is not None and not speedup > 0.0:
             raise ConfigError(f"speedup is {speedup}; it must be positive, or None to go as fast as can be.")
-        self.mode, self.arena = mode, _arena_of(game)
-        self.show_commands = show_commands
+        self.mode, self.show_commands, self.speedup = mode, show_commands, speedup
         self._looks = (width_px, theme)
-        self._picture = Picture(self.arena, *self._looks)
-        self.speedup = speedup
+        self.describe(game)
         self.overlay: Overlay | None = None
         """What `draw` shows when it is given no overlay: whoever sends the commands may leave them here."""
         self._window: Window | None = None
         self._track: deque[np.ndarray] = deque(maxlen=max(2, round(TRAIL_S / self.arena.dt_s)))
         self._last_s = -np.inf
 
-    def describe(self, game: Mapping[str, Any] | Arena) -> None:
+    def describe(self, game: GameConfig | Mapping[str, Any] | Arena) -> None:
         """Take over what the game's config does not tell: shielded boats, separation, policies, reasons.
 
         Args:
@@ -69,7 +122,9 @@ class Renderer:
         Raises:
             TraceError: The settings cannot be drawn.
         """
-        self.arena = _arena_of(game)
+        if isinstance(game, GameConfig):
+            game = Arena.from_config(game)
+        self.arena = game if isinstance(game, Arena) else Arena.from_meta(game)
         self._picture = Picture(self.arena, *self._looks)
 
     def draw(self, view: Any, overlay: Overlay | None = None) -> np.ndarray | None:
@@ -111,89 +166,12 @@ class Renderer:
     def close(self) -> None:
         """Close the window, if there is one; may be called again."""
         if self._window is not None:
-            self._window.close()
+            pygame.display.quit()
             self._window = None
-
-
-def _arena_of(game: GameConfig | Mapping[str, Any] | Arena) -> Arena:
-    if isinstance(game, Arena):
-        return game
-    return Arena.from_config(game) if isinstance(game, GameConfig) else Arena.from_meta(game)
-
-
-MARGIN_PX = 24
-MIN_WIDTH_PX = 320
-MAX_WIDTH_PX = 4096
-BLOCK_PX = 16
-"""Both sides are multiples of this, because video encoders work in such blocks."""
-
-
-class Picture:
-    """Draws scenes of one arena.
-
-    Args:
-        arena: The field.
-        width_px: Width of the picture; the height follows from the field.
-        theme: "light" or "dark".
-
-    Raises:
-        ConfigError: The width or the theme cannot be used.
-    """
-
-    def __init__(self, arena: Arena, width_px: int = 1280, theme: str = "light") -> None:
-        if not MIN_WIDTH_PX <= width_px <= MAX_WIDTH_PX:
-            raise ConfigError(f"width_px is {width_px}; choose {MIN_WIDTH_PX} to {MAX_WIDTH_PX} pixels.")
-        self.arena, self.theme = arena, get_theme(theme)
-        width_px = BLOCK_PX * round(width_px / BLOCK_PX)
-        inner_px = width_px - 2 * MARGIN_PX
-        scale = min(inner_px / arena.bounds_m[0], inner_px / arena.bounds_m[1])
-        field_px = arena.bounds_m[0] * scale, arena.bounds_m[1] * scale
-        height_px = BLOCK_PX * math.ceil((HEADER_PX + field_px[1] + FOOTER_PX) / BLOCK_PX)
-        origin_px = ((width_px - field_px[0]) / 2, HEADER_PX + field_px[1])
-        self.size_px = (width_px, height_px)
-        self._canvas = Canvas(self.size_px, origin_px, scale)
-        draw_field(self._canvas, arena, self.theme)
-        self._field = self._canvas.surface.copy()
-
-    def still(self) -> pygame.Surface:
-        """Return the field alone."""
-        self._canvas.surface.blit(self._field, (0, 0))
-        return self._canvas.finished()
-
-    def draw(self, scene: Scene, show_commands: bool = True) -> pygame.Surface:
-        """Draw a moment.
-
-        Args:
-            scene: The moment.
-            show_commands: Draw wanted and sent commands, where the scene has them.
-
-        Returns:
-            A surface of ``size_px``.
-        """
-        self._canvas.surface.blit(self._field, (0, 0))
-        draw_boats(self._canvas, scene, self.arena, self.theme, show_commands)
-        surface = self._canvas.finished()
-        draw_labels(surface, self._canvas, scene, self.arena, self.theme)
-        draw_header(surface, scene, self.arena, self.theme, MARGIN_PX)
-        draw_legend(surface, self.arena, self.theme, MARGIN_PX)
-        return surface
-
-
-def pixels(surface: pygame.Surface) -> np.ndarray:
-    """Return a surface as (height, width, 3) uint8, red-green-blue."""
-    return np.ascontiguousarray(pygame.surfarray.array3d(surface).swapaxes(0, 1))
-
-
-UNSEEN = ("dummy", "offscreen")
-"""Drivers SDL falls back to where there is no display: windows open, and nobody sees them."""
 
 
 class Window:
     """A window on the screen.
-
-    Args:
-        size_px: Width and height.
-        title: Text of the title bar.
 
     Raises:
         ConfigError: There is no display to open a window on.
@@ -215,21 +193,15 @@ class Window:
         self._keys: set[str] = set()
         self._tapped: set[str] = set()
         self.closed = False
-        """Whether the user has closed the window."""
 
     def show(self, surface: pygame.Surface, frames_per_s: float | None) -> None:
-        """Show a picture, answer the window system, and wait so that frames come no faster than asked.
-
-        Args:
-            surface: The picture.
-            frames_per_s: Most pictures per second; None does not wait.
-        """
+        """Show a picture, answer the window system, and wait so that frames come no faster than asked."""
         self._screen.blit(surface, (0, 0))
         pygame.display.flip()
-        self.pump()
+        self._pump()
         self._clock.tick(frames_per_s or 0)
 
-    def pump(self) -> None:
+    def _pump(self) -> None:
         """Take in what the window system and the keyboard have to say."""
         for event in pygame.event.get():
             if event.type == pygame.QUIT:
@@ -244,10 +216,6 @@ class Window:
 
     def keys(self) -> set[str]:
         """Return the names of the keys held down, or pressed since the last call: "left", "w", "space" and so on."""
-        self.pump()
+        self._pump()
         held, self._tapped = self._keys | self._tapped, set()
         return held
-
-    def close(self) -> None:
-        """Close the window."""
-        pygame.display.quit()

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from steerclear.env.config import GameConfig
+from steerclear.env.record import meta_of
 from steerclear.env.record_file import NOT_COVERED
-from steerclear.env.record_meta import meta_of
-from steerclear.shield.exceptions import ConfigError, TraceError
+from steerclear.shield.exceptions import TraceError
 from steerclear.shield.platforms.layout import HEADING, SPEED, X, Y
 
 HULL_LENGTH_M = {"heron": 1.3, "surveyor": 1.8, "large_usv": 4.0}
@@ -18,89 +18,65 @@ HULL_LENGTH_M = {"heron": 1.3, "surveyor": 1.8, "large_usv": 4.0}
 
 DEFAULT_HULL_M = 1.5
 
+TRAIL_S = 12.0
+"""Length of the track drawn behind each boat, s."""
+
+Pair = tuple[float, float]
+
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A fixed obstacle: a circle (``radius_m`` > 0 around the one point) or a polygon.
+    """A fixed obstacle: a circle (``radius_m`` > 0 around the one point) or the corners of a polygon, m."""
 
-    Attributes:
-        points_m: Centre, or the corners in order, m.
-        radius_m: Radius of a circle, 0 for a polygon.
-    """
-
-    points_m: tuple[tuple[float, float], ...]
+    points_m: tuple[Pair, ...]
     radius_m: float = 0.0
 
 
 @dataclass(frozen=True)
 class Arena:
-    """The settings a picture needs.
+    """The settings a picture needs; distances in m."""
 
-    Attributes:
-        bounds_m: Width and height of the field.
-        flag_home_m: Home of each team's flag.
-        catch_radius_m: Tag and grab radius.
-        flag_keepout_m: Radius around a flag at home that its own boats stay out of.
-        separation_m: Distance at which two boat centres are in breach.
-        scrimmage_m: Two points of the line between the halves.
-        team: Team of each boat.
-        names: Name of each boat.
-        platforms: Platform of each boat.
-        shielded: Names of the boats a shield covers.
-        reason_names: Text of each shield reason code.
-        policies: What plays blue and red, for the header.
-        obstacles: Fixed obstacles.
-        dt_s: Length of a step.
-        title: Text for the header's middle.
-        steered: Names of the boats that a human steers.
-        corner_radius_m: Radius around the corners of each side where captures and untagging happen; 0 for none.
-    """
-
-    bounds_m: tuple[float, float]
-    flag_home_m: tuple[tuple[float, float], tuple[float, float]]
-    catch_radius_m: float
-    flag_keepout_m: float
-    separation_m: float
-    scrimmage_m: tuple[tuple[float, float], tuple[float, float]]
-    team: tuple[int, ...]
+    bounds_m: Pair  # Width and height of the field
+    flag_home_m: tuple[Pair, Pair]  # Home of each team's flag
+    catch_radius_m: float  # Tag and grab radius
+    flag_keepout_m: float  # Radius around a flag at home that its own boats stay out of
+    separation_m: float  # Distance at which two boat centres violate the separation
+    scrimmage_m: tuple[Pair, Pair]  # Two points of the line between the halves
+    team: tuple[int, ...]  # Team of each boat; ``names`` and ``platforms`` likewise
     names: tuple[str, ...]
     platforms: tuple[str, ...]
-    shielded: frozenset[str] = frozenset()
-    reason_names: tuple[str, ...] = ()
-    policies: tuple[str, str] = ("", "")
-    obstacles: tuple[Obstacle, ...] = field(default=())
-    dt_s: float = 0.1
-    title: str = ""
-    steered: frozenset[str] = frozenset()
+    shielded: frozenset[str] = frozenset()  # Names of the boats a shield covers
+    reason_names: tuple[str, ...] = ()  # Text of each shield reason code
+    policies: tuple[str, str] = ("", "")  # What plays blue and red, for the header
+    obstacles: tuple[Obstacle, ...] = ()  # Fixed obstacles
+    dt_s: float = 0.1  # Length of a step
+    title: str = ""  # Text for the header's middle
+    steered: frozenset[str] = frozenset()  # Names of the boats that a human steers
+    # Radius around the corners of each side where captures and untagging happen; 0 for none
     corner_radius_m: float = 0.0
 
     @classmethod
     def from_meta(cls, meta: Mapping[str, Any]) -> Arena:
-        """Read a record's ``meta``.
-
-        Args:
-            meta: See ``record_file.META_KEYS``.
-
-        Returns:
-            The arena.
+        """Read a record's ``meta``, see ``record_file.META_KEYS``.
 
         Raises:
             TraceError: A key is missing or has a value of the wrong kind.
         """
         try:
-            homes = _pair(meta["flag_home"])
+            home, away = map(_point, meta["flag_home"])
+            start, end = map(_point, meta.get("scrimmage") or _bisector(home, away))
             return cls(
                 bounds_m=_point(meta["env_bounds_m"]),
-                flag_home_m=homes,
-                scrimmage_m=_pair(meta["scrimmage"]) if meta.get("scrimmage") else _bisector(homes),
+                flag_home_m=(home, away),
+                scrimmage_m=(start, end),
                 catch_radius_m=float(meta["catch_radius_m"]),
                 flag_keepout_m=float(meta["flag_keepout_m"]),
                 separation_m=float(meta["separation_m"]),
-                team=tuple(int(side) for side in meta["team"]),
-                names=tuple(str(name) for name in meta["agent_ids"]),
-                platforms=tuple(str(name) for name in meta["platforms"]),
+                team=tuple(map(int, meta["team"])),
+                names=tuple(map(str, meta["agent_ids"])),
+                platforms=tuple(map(str, meta["platforms"])),
                 shielded=frozenset(meta["shielded"]),
-                reason_names=tuple(str(name) for name in meta["reason_names"]),
+                reason_names=tuple(map(str, meta["reason_names"])),
                 policies=(str(meta["policies"].get("blue", "")), str(meta["policies"].get("red", ""))),
                 obstacles=_obstacles(meta.get("obstacles") or {}),
                 dt_s=float(meta["dt_s"]),
@@ -114,14 +90,7 @@ class Arena:
 
     @classmethod
     def from_config(cls, config: GameConfig, **settings: Any) -> Arena:
-        """Read a game's settings.
-
-        Args:
-            config: The game's settings.
-            **settings: What a game does not know: see ``meta_of``.
-
-        Returns:
-            The arena.
+        """Read a game's settings, and those that a game does not know: see ``meta_of``.
 
         Raises:
             TraceError: A setting has a value of the wrong kind.
@@ -136,265 +105,97 @@ class Arena:
         """Return the text of a reason code, or its number when there is none."""
         if code == NOT_COVERED:
             return "no shield"
-        known = 0 <= code < len(self.reason_names)
-        words = self.reason_names[code].replace("_", " ").lower() if known else f"reason {code}"
-        return words.replace("qp", "QP")
+        if not 0 <= code < len(self.reason_names):
+            return f"reason {code}"
+        return self.reason_names[code].replace("_", " ").lower().replace("qp", "QP")
 
 
-def _point(values: Any) -> tuple[float, float]:
+def _point(values: Any) -> Pair:
     x, y = values
     return float(x), float(y)
 
 
-def _pair(values: Any) -> tuple[tuple[float, float], tuple[float, float]]:
-    first, second = values
-    return _point(first), _point(second)
-
-
-def _bisector(
-    homes: tuple[tuple[float, float], tuple[float, float]],
-) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return two points of the line that has the same distance to both flag homes."""
-    (ax, ay), (bx, by) = homes
-    x, y = (ax + bx) / 2, (ay + by) / 2
-    return (x, y), (x + (by - ay), y - (bx - ax))
+def _bisector(home: Pair, away: Pair) -> tuple[Pair, Pair]:
+    """Two points of the line that has the same distance to both flag homes."""
+    x, y = (home[0] + away[0]) / 2, (home[1] + away[1]) / 2
+    return (x, y), (x + (away[1] - home[1]), y - (away[0] - home[0]))
 
 
 def _obstacles(entries: Mapping[str, Any]) -> tuple[Obstacle, ...]:
-    """Read obstacles as ``GameConfig`` has them: circles (radius, centre) and polygons."""
     circles = [Obstacle((_point(centre),), float(radius)) for radius, centre in entries.get("circle", ())]
-    return (*circles, *(Obstacle(tuple(_point(corner) for corner in shape)) for shape in entries.get("polygon", ())))
-
-
-Colour = tuple[int, int, int]
-
-
-@dataclass(frozen=True)
-class Theme:
-    """One set of colours, red-green-blue 0..255.
-
-    Attributes:
-        page: Around the field.
-        water: Field of team 0 and of team 1.
-        grid: Lines every 10 m.
-        edge: Border of the field and the scrimmage line.
-        ink: Text and strong marks.
-        muted: Secondary text.
-        team: Team 0 and team 1.
-        wanted: Arrow of a command the shield did not send.
-        changed: Arrow and halo of a command the shield changed.
-        breach: Two boats inside the separation radius.
-        obstacle: Fixed obstacles.
-        plate: Behind labels.
-    """
-
-    page: Colour
-    water: tuple[Colour, Colour]
-    grid: Colour
-    edge: Colour
-    ink: Colour
-    muted: Colour
-    team: tuple[Colour, Colour]
-    wanted: Colour
-    changed: Colour
-    breach: Colour
-    obstacle: Colour
-    plate: Colour
-
-
-THEMES = {
-    "light": Theme(
-        page=(248, 250, 252),
-        water=((226, 238, 250), (251, 233, 229)),
-        grid=(255, 255, 255),
-        edge=(100, 116, 139),
-        ink=(15, 23, 42),
-        muted=(84, 98, 118),
-        team=((29, 92, 208), (206, 58, 48)),
-        wanted=(71, 85, 105),
-        changed=(240, 130, 0),
-        breach=(190, 24, 147),
-        obstacle=(120, 113, 108),
-        plate=(255, 255, 255),
-    ),
-    "dark": Theme(
-        page=(11, 18, 32),
-        water=((16, 38, 66), (56, 27, 36)),
-        grid=(38, 56, 84),
-        edge=(120, 140, 168),
-        ink=(236, 242, 250),
-        muted=(148, 163, 184),
-        team=((86, 156, 255), (255, 108, 96)),
-        wanted=(190, 202, 220),
-        changed=(255, 171, 46),
-        breach=(255, 92, 214),
-        obstacle=(148, 140, 132),
-        plate=(20, 30, 48),
-    ),
-}
-"""The themes by name."""
-
-
-def get_theme(name: str) -> Theme:
-    """Look up a theme.
-
-    Args:
-        name: One of ``THEMES``.
-
-    Returns:
-        The theme.
-
-    Raises:
-        ConfigError: There is no theme of that name.
-    """
-    if name not in THEMES:
-        raise ConfigError(f"there is no theme {name!r}; choose {' or '.join(THEMES)}.")
-    return THEMES[name]
-
-
-def mix(first: Colour, second: Colour, share: float) -> Colour:
-    """Blend two colours; ``share`` 0 gives the first, 1 the second."""
-    red, green, blue = (round(a + (b - a) * share) for a, b in zip(first, second, strict=True))
-    return red, green, blue
-
-
-TRAIL_S = 12.0
-"""Length of the track drawn behind each boat, s."""
+    return (*circles, *(Obstacle(tuple(map(_point, shape))) for shape in entries.get("polygon", ())))
 
 
 @dataclass(frozen=True)
 class Overlay:
-    """What was asked of the boats and what the shield made of it, for n boats.
+    """Nominal commands of n boats and what the shield made of them."""
 
-    Attributes:
-        wanted: (n, 2) speed m/s and absolute heading deg asked for.
-        sent: (n, 2) likewise, what the boats were told.
-        reason: (n,) shield reason codes.
-        intervened: (n,) bool.
-        safety_margin_m: (n,) NaN where there is none.
-    """
-
-    wanted: np.ndarray
-    sent: np.ndarray
-    reason: np.ndarray
-    intervened: np.ndarray
-    safety_margin_m: np.ndarray
+    wanted: np.ndarray  # (n, 2) nominal speed m/s and absolute heading deg
+    sent: np.ndarray  # (n, 2) likewise, what the boats received
+    reason: np.ndarray  # (n,) shield reason codes
+    intervened: np.ndarray  # (n,) bool
+    safety_margin_m: np.ndarray  # (n,) NaN where there is none
 
     @classmethod
     def of_commands(cls, wanted: np.ndarray, sent: np.ndarray) -> Overlay:
-        """Show commands of which nothing but the values is known; those that differ count as changed.
-
-        Args:
-            wanted: (n, 2) speed m/s and absolute heading deg asked for.
-            sent: (n, 2) likewise, what the boats were told.
-
-        Returns:
-            The overlay, without reasons and certificates.
-        """
+        """Show commands (n, 2) of which only the values are known; those that differ count as changed."""
         changed = np.any(np.not_equal(wanted, sent), axis=1)
         return cls(wanted, sent, np.full(len(changed), NOT_COVERED), changed, np.full(len(changed), np.nan))
 
 
+_OF_BOATS = ("has_flag", "is_tagged", "oob")
+
+
 @dataclass(frozen=True)
 class Scene:
-    """One moment, n boats.
+    """One moment, n boats."""
 
-    Attributes:
-        time_s: Time since the start.
-        position_m: (n, 2).
-        heading_deg: (n,) clockwise from north.
-        speed_mps: (n,).
-        has_flag: (n,) bool.
-        is_tagged: (n,) bool.
-        oob: (n,) bool, out of bounds.
-        is_disabled: (n,) bool, stopped by a power play.
-        flag_position_m: (2, 2).
-        captures: (2,) captures made by each team.
-        trail_m: (k, n, 2) positions up to now, oldest first.
-        overlay: Commands, or None.
-    """
-
-    time_s: float
-    position_m: np.ndarray
-    heading_deg: np.ndarray
-    speed_mps: np.ndarray
+    time_s: float  # Time since the start
+    position_m: np.ndarray  # (n, 2)
+    heading_deg: np.ndarray  # (n,) clockwise from north
+    speed_mps: np.ndarray  # (n,)
+    # (n,) bool; ``is_tagged``, ``oob`` (out of bounds), ``is_disabled`` (by a power play) likewise
     has_flag: np.ndarray
     is_tagged: np.ndarray
     oob: np.ndarray
     is_disabled: np.ndarray
-    flag_position_m: np.ndarray
-    captures: np.ndarray
-    trail_m: np.ndarray
-    overlay: Overlay | None = None
+    flag_position_m: np.ndarray  # (2, 2)
+    captures: np.ndarray  # (2,) captures made by each team
+    trail_m: np.ndarray  # (k, n, 2) positions up to now, oldest first
+    overlay: Overlay | None = None  # Commands, or None
 
     @classmethod
     def from_view(cls, view: Any, trail_m: np.ndarray, overlay: Overlay | None = None) -> Scene:
-        """Take a live game.
-
-        Args:
-            view: A ``GameView``.
-            trail_m: (k, n, 2) positions up to now.
-            overlay: Commands of the last step.
-
-        Returns:
-            The scene.
-        """
+        """Take a live game: a ``GameView``, positions (k, n, 2) up to now, and the commands of the last step."""
         state = np.asarray(view.state)
-        return cls(
-            float(view.time_s),
-            state[:, [X, Y]],
-            state[:, HEADING],
-            state[:, SPEED],
-            np.asarray(view.has_flag),
-            np.asarray(view.is_tagged),
-            np.asarray(view.oob),
-            np.asarray(view.is_disabled),
-            np.asarray(view.flag_position),
-            np.asarray(view.captures),
-            trail_m,
-            overlay,
-        )
+        marks = (np.asarray(getattr(view, name)) for name in (*_OF_BOATS, "is_disabled", "flag_position", "captures"))
+        return cls(float(view.time_s), state[:, [X, Y]], state[:, HEADING], state[:, SPEED], *marks, trail_m, overlay)
 
     @classmethod
     def from_record(cls, record: Mapping[str, np.ndarray], step: int, dt_s: float) -> Scene:
-        """Take a step of a record, with the command that is given at that step.
-
-        Args:
-            record: A record of T steps.
-            step: 0..T; the last state shows the last command.
-            dt_s: Length of a step.
-
-        Returns:
-            The scene.
-        """
-        first = max(0, step - round(TRAIL_S / dt_s))
-        asked = min(step, len(record["wanted"]) - 1)
+        """Take step 0..T of a record, with the command that is given there; the last state shows the last command."""
+        commanded = min(step, len(record["wanted"]) - 1)
         commands = ("wanted", "sent", "reason", "intervened", "safety_margin_m")
-        overlay = None if asked < 0 else Overlay(*(record[name][asked] for name in commands))
-        trail_m = record["position"][first : step + 1]
+        overlay = None if commanded < 0 else Overlay(*(record[name][commanded] for name in commands))
+        trail_m = record["position"][max(0, step - round(TRAIL_S / dt_s)) : step + 1]
+        boats = (record[name][step] for name in ("position", "heading_deg", "speed_mps", *_OF_BOATS))
         disabled = record["is_disabled"][step] if "is_disabled" in record else np.zeros(trail_m.shape[1], dtype=bool)
-        states = ("position", "heading_deg", "speed_mps", "has_flag", "is_tagged", "oob")
-        boats = (record[name][step] for name in states)
         flags = (record[name][step] for name in ("flag_position", "captures"))
         return cls(step * dt_s, *boats, disabled, *flags, trail_m, overlay)
 
 
-def closest_pair(scene: Scene, arena: Arena) -> tuple[int, int, float] | None:
-    """Find the closest two boats, of which a shielded one where there is any.
-
-    Args:
-        scene: The moment.
-        arena: Names the shielded boats.
-
-    Returns:
-        Boat, boat, distance m; None with fewer than two boats.
-    """
-    n = len(scene.position_m)
-    if n < 2:
-        return None
+def _gaps_m(scene: Scene) -> np.ndarray:
+    """(n, n) distances above the diagonal, infinite elsewhere."""
     gap_m = np.linalg.norm(scene.position_m[:, None] - scene.position_m[None], axis=-1)
-    gap_m[np.tril_indices(n)] = np.inf
-    covered = np.array([name in arena.shielded for name in arena.names])
+    gap_m[np.tril_indices(len(gap_m))] = np.inf
+    return np.asarray(gap_m)
+
+
+def closest_pair(scene: Scene, arena: Arena) -> tuple[int, int, float] | None:
+    """Return the closest two boats, one of them shielded where any is, and their distance, m; None without a pair."""
+    if len(scene.position_m) < 2:
+        return None
+    gap_m, covered = _gaps_m(scene), np.array([name in arena.shielded for name in arena.names])
     if covered.any():
         gap_m[~(covered[:, None] | covered[None])] = np.inf
     first, second = np.unravel_index(int(gap_m.argmin()), gap_m.shape)
@@ -403,6 +204,5 @@ def closest_pair(scene: Scene, arena: Arena) -> tuple[int, int, float] | None:
 
 def boats_in_breach(scene: Scene, separation_m: float) -> list[tuple[int, int]]:
     """List the pairs of boats within the separation radius."""
-    gap_m = np.linalg.norm(scene.position_m[:, None] - scene.position_m[None], axis=-1)
-    first, second = np.nonzero(np.triu(gap_m <= separation_m, k=1))
+    first, second = np.nonzero(_gaps_m(scene) <= separation_m)
     return list(zip(first.tolist(), second.tolist(), strict=True))

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from steerclear.env.mctf import MctfEnv
-from steerclear.env.record import Record, absolute_commands, find_breaches
-from steerclear.env.record_meta import meta_of
+from steerclear.env.record import Record, absolute_commands, find_breaches, meta_of
 from steerclear.policies.registry import KEYBOARD
 from steerclear.shield.exceptions import GameError, SteerclearError
 from steerclear.shield.jit import Array

@@ -12,8 +12,7 @@ import numpy as np
 from rich.console import Console
 from steerclear.shield.exceptions import TableError
 from steerclear.shield.tables.areas import HEADINGS_DEG, SPEED_SHARES, unsafe
-from steerclear.shield.tables.card import Card
-from steerclear.shield.tables.files import ValueTable
+from steerclear.shield.tables.files import Card, ValueTable
 from steerclear.shield.tables.make import COARSER
 
 from ..markdown import MADE, goals_of, goals_table, line, table

@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 from steerclear.env.config import GameConfig
-from steerclear.env.record import Record
-from steerclear.env.record_meta import DEFAULT_SEPARATION_M
+from steerclear.env.record import DEFAULT_SEPARATION_M, Record
 from steerclear.experiments.deploy.rules import game_config
 from steerclear.shield.bridge.clock import Clock, MonotonicClock
 from steerclear.shield.bridge.fleet_file import FleetFile, load_fleet

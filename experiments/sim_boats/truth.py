@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from steerclear.env.record import GameRecorder, Record, find_breaches
-from steerclear.env.record_meta import DEFAULT_SEPARATION_M, meta_of
+from steerclear.env.record import DEFAULT_SEPARATION_M, GameRecorder, Record, find_breaches, meta_of
 from steerclear.experiments.verdicts import StateLog, judge_game
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array

@@ -14,9 +14,16 @@ import numpy as np
 
 from ..jit import Array, lean_kernel
 from . import layout as L
-from .held import error_for_turn, moves_in, turn_at_rudder
-from .integrators import step_double_integrator, step_single_integrator
-from .rate import error_for_rate, rate_after, run_rate, turn_limit, wanted_for_turn
+from .rate import (
+    error_for_rate,
+    rate_after,
+    run_rate,
+    step_double_integrator,
+    step_single_integrator,
+    turn_limit,
+    wanted_for_turn,
+)
+from .step import error_for_turn, moves_in, turn_at_rudder
 from .usv import actuate_usv, clamp, next_thrust, turn_of_rudder
 
 FARTHEST_DEG = 179.0
@@ -69,10 +76,7 @@ def full_turn(params: Array, state: Array, speed_mps: float, dt_s: float) -> flo
 
 @lean_kernel
 def actuate(params: Array, state: Array, speed_mps: float, turn_deg: float, dt_s: float) -> None:
-    """Advance one step turning by ``turn_deg`` as nearly as a rudder that can be held allows; changes ``state``.
-
-    The heading controller's memory is left alone: a prediction made of such steps needs none.
-    """
+    """Advance ``state`` one step, turning as nearly by ``turn_deg`` as a rudder that can be held allows."""
     kind = params[L.KIND]
     if kind == L.KIND_USV:
         full = turn_of_rudder(params, thrust_after(params, state, speed_mps, dt_s), 100.0, dt_s)

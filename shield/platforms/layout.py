@@ -60,7 +60,7 @@ MAP_CAPACITY = 8
 MAP_SPEED = MAP_THRUST + MAP_CAPACITY
 N_PARAM = MAP_SPEED + MAP_CAPACITY
 MOVE_S = N_PARAM
-"""Column of rows that have one more: length of a move, s, of which a step under one command has several, see `held`."""
+"""Column of rows that have one more: length of a move, s, of which a step under one command has several, see `step`."""
 
 # --- values of KIND --------------------------------------------------------------------------------
 KIND_USV = 0

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -27,27 +29,17 @@ ENOUGH_THRUST = 0.85
 
 @dataclass(frozen=True)
 class Limits:
-    """Measured limits of a platform behind its autopilot.
+    """Measured limits of a platform behind its autopilot."""
 
-    Attributes:
-        top_speed_mps: top speed, m/s.
-        acceleration_mps2: highest acceleration, mean over any 0.2 s, from rest or out of a hard turn, m/s^2.
-        turn_rate_dps: highest turn rate in a hard turn begun at top speed, deg/s (thrust may rise in it).
-        half_turn_s: time of a 180 deg turn at the rudder the autopilot can hold and full speed command, begun at top
-            speed, s.
-        turn_loss: share of top speed lost in a long turn at full rudder and full speed command.
-        turn_deceleration_mps2: mean rate at which that speed is lost, over the first half of the loss, m/s^2.
-        thrust: thrust at top speed, percent; 0 without a thrust model.
-        thrust_s: longest time under a full speed command until 90 % of that is there, from rest or out of a stop, s.
-    """
-
-    top_speed_mps: float
-    acceleration_mps2: float
-    turn_rate_dps: float
+    top_speed_mps: float  # top speed, m/s
+    acceleration_mps2: float  # highest acceleration, mean over any 0.2 s, from rest or out of a hard turn, m/s^2
+    turn_rate_dps: float  # highest turn rate in a hard turn begun at top speed, deg/s (thrust may rise in it)
+    # time of a 180 deg turn at the rudder the autopilot can hold and full speed command, begun at top speed, s
     half_turn_s: float
-    turn_loss: float
-    turn_deceleration_mps2: float
-    thrust: float
+    turn_loss: float  # share of top speed lost in a long turn at full rudder and full speed command
+    turn_deceleration_mps2: float  # mean rate at which that speed is lost, over the first half of the loss, m/s^2
+    thrust: float  # thrust at top speed, percent; 0 without a thrust model
+    # longest time under a full speed command until 90 % of that is there, from rest or out of a stop, s
     thrust_s: float
 
     @property
@@ -59,7 +51,7 @@ class Limits:
 @lru_cache(maxsize=64)
 def limits_of(platform: Platform, dt_s: float = 0.1) -> Limits:
     """Limits of a platform, by simulation with step ``dt_s``, s."""
-    speeds = _speeds_in_turn(platform, dt_s)
+    speeds = np.array([float(state[L.SPEED]) for state in _hard_turn(platform, dt_s)])
     return Limits(
         top_speed_mps=platform.max_speed_mps,
         acceleration_mps2=_acceleration(platform, dt_s),
@@ -72,13 +64,25 @@ def limits_of(platform: Platform, dt_s: float = 0.1) -> Limits:
     )
 
 
+def _hard_turn(platform: Platform, dt_s: float, any_rudder: bool = True) -> Iterator[Array]:
+    """States of a boat, step after step, in a turn of `LONGEST_S` begun at top speed, the first and under full thrust.
+
+    With ``any_rudder`` it has all of its rudder to hold: what others are granted hangs on no autopilot.
+    """
+    params, state = cruise(platform, dt_s)
+    if any_rudder:
+        params = params.copy()
+        params[L.HEADING_KP] = np.inf
+    yield state
+    for _ in range(int(LONGEST_S / dt_s)):
+        actuate(params, state, platform.max_speed_mps, 2.0 * largest_turn(params, state, dt_s) + 1e-9, dt_s)
+        yield state
+
+
 def _acceleration(platform: Platform, dt_s: float) -> float:
     """The larger of a start from rest and a rudder let go after a long hard turn, which gives its speed back."""
-    rest = fresh_state(0.0, 0.0, 0.0)
-    params, turning = _any_rudder(*cruise(platform, dt_s))
-    for _ in range(int(LONGEST_S / dt_s)):
-        actuate(params, turning, platform.max_speed_mps, 2.0 * largest_turn(params, turning, dt_s) + 1e-9, dt_s)
-    return max(_gain(platform, start, dt_s) for start in (rest, turning))
+    *_, turning = _hard_turn(platform, dt_s)
+    return max(_gain(platform, start, dt_s) for start in (fresh_state(0.0, 0.0, 0.0), turning))
 
 
 def _gain(platform: Platform, state: Array, dt_s: float) -> float:
@@ -103,34 +107,17 @@ def cruise(platform: Platform, dt_s: float = 0.1) -> tuple[Array, Array]:
     return params, state
 
 
-def _any_rudder(params: Array, state: Array) -> tuple[Array, Array]:
-    """The same boat with all of its rudder to hold: what others are granted hangs on no autopilot."""
-    params = params.copy()
-    params[L.HEADING_KP] = np.inf
-    return params, state
-
-
 def _turn_rate(platform: Platform, dt_s: float) -> float:
     """Highest turn rate, deg/s: the speed controller answers the speed lost in a turn with thrust, and so with turn."""
     if platform.kind == "rate":
         return max(platform.max_turn_rate_at(0.0), platform.max_turn_rate_at(platform.max_speed_mps))
-    params, state = _any_rudder(*cruise(platform, dt_s))
-    fastest = 0.0
-    for _ in range(int(LONGEST_S / dt_s)):
-        before = state[L.HEADING]
-        actuate(params, state, platform.max_speed_mps, 2.0 * largest_turn(params, state, dt_s) + 1e-9, dt_s)
-        fastest = max(fastest, float((state[L.HEADING] - before) % 360.0) / dt_s)
-    return round(fastest, 9)
+    return round(max(_turns(platform, dt_s, True)) / dt_s, 9)
 
 
-def _speeds_in_turn(platform: Platform, dt_s: float) -> Array:
-    """Speeds, m/s, over a turn of `LONGEST_S` begun at top speed."""
-    params, state = _any_rudder(*cruise(platform, dt_s))
-    speeds = [float(state[L.SPEED])]
-    for _ in range(int(LONGEST_S / dt_s)):
-        actuate(params, state, platform.max_speed_mps, 2.0 * largest_turn(params, state, dt_s) + 1e-9, dt_s)
-        speeds.append(float(state[L.SPEED]))
-    return np.array(speeds)
+def _turns(platform: Platform, dt_s: float, any_rudder: bool) -> Iterator[float]:
+    """Turns, deg, of the steps of a hard turn."""
+    headings = (float(state[L.HEADING]) for state in _hard_turn(platform, dt_s, any_rudder))
+    return ((after - before) % 360.0 for before, after in pairwise(headings))
 
 
 def _deceleration(speeds: Array, dt_s: float) -> float:
@@ -140,13 +127,12 @@ def _deceleration(speeds: Array, dt_s: float) -> float:
 
 
 def _half_turn(platform: Platform, dt_s: float) -> float:
-    params, state = cruise(platform, dt_s)
+    """Time of a turn of 180 deg, s."""
     turned, step = 0.0, 0
-    while turned < 180.0 and step * dt_s < LONGEST_S:
-        before = state[L.HEADING]
-        actuate(params, state, platform.max_speed_mps, 2.0 * largest_turn(params, state, dt_s) + 1e-9, dt_s)
-        turned += (state[L.HEADING] - before) % 360.0
-        step += 1
+    for turn in _turns(platform, dt_s, False):
+        turned, step = turned + turn, step + 1
+        if turned >= 180.0:
+            break
     return step * dt_s
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import astuple, dataclass, field, fields
 from itertools import pairwise
 
 import numpy as np
@@ -19,6 +19,54 @@ KINDS = {
     "double_integrator": L.KIND_DOUBLE_INTEGRATOR,
     "rate": L.KIND_RATE,
 }
+
+
+ALL = ("usv", "rate", "double_integrator", "single_integrator")
+USV, RATE, BOATS, LIMITED = ALL[:1], ALL[1:2], ALL[:2], ALL[1:3]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One entry of a platform, and what a platform file says of it."""
+
+    unit: str  # of its value; empty: none
+    words: str  # what it is
+    kinds: tuple[str, ...] = ALL  # of boats it is for
+    column: int = -1  # where it begins in the parameter row
+
+
+ENTRIES: dict[str, Entry] = {
+    "max_speed_mps": Entry("m/s", "top speed", ALL, L.MAX_SPEED),
+    "max_acc": Entry("m/s2", "limit on gaining speed; of kind usv 0 is none", (*USV, *LIMITED), L.MAX_ACC),
+    "max_dec": Entry("m/s2", "limit on losing speed; 0: of kind rate as max_acc, of kind usv none", BOATS, L.MAX_DEC),
+    "speed_lag_s": Entry("s", "lag of the speed behind its command", RATE, L.SPEED_LAG),
+    "max_turn_rate_dps": Entry("deg/s", "highest turn rate at any speed", ALL[1:], L.MAX_TURN_RATE),
+    "max_angular_acc_dps2": Entry("deg/s2", "limit on changing the turn rate", LIMITED, L.MAX_ANGULAR_ACC),
+    "turn_rate_at_rest_dps": Entry(
+        "deg/s", "highest turn rate without way; 0: it has to go to steer", RATE, L.TURN_AT_REST
+    ),
+    "turn_rate_per_mps": Entry(
+        "deg/s per m/s", "turn rate gained with speed; below 0: two propellers lose it", RATE, L.TURN_PER_SPEED
+    ),
+    "turn_lag_s": Entry("s", "lag of the turn rate behind what is asked for", RATE, L.TURN_LAG),
+    "turn_loss": Entry(
+        "share", "of speed lost at full rudder, or at the highest turn rate; 0 to 1", BOATS, L.TURN_LOSS
+    ),
+    "heading_pid": Entry(
+        "", "heading controller: rudder percent per deg (usv), deg/s per deg (rate: kp alone)", BOATS, L.HEADING_KP
+    ),
+    "thrust_map": Entry("percent, m/s", "(thrust, steady speed) points, thrust rising", USV, L.MAP_THRUST),
+    "speed_factor": Entry(
+        "percent per m/s", "thrust per commanded speed; 0: speed_pid changes the thrust", USV, L.SPEED_FACTOR
+    ),
+    "max_thrust": Entry("percent", "largest thrust", USV, L.MAX_THRUST),
+    "max_rudder": Entry("percent", "largest rudder", USV, L.MAX_RUDDER),
+    "turn_gain": Entry("deg/s", "turn rate at full rudder and thrust 50; twice that at thrust 100", USV, L.TURN_GAIN),
+    "rotate_speed_dps": Entry("deg/s", "turn rate that is always there", USV, L.ROTATE_SPEED),
+    "speed_gain": Entry("percent per output", "of speed_pid, added to the thrust in each step", USV, L.SPEED_GAIN),
+    "speed_pid": Entry("", "speed controller: output per m/s", USV, L.SPEED_KP),
+}
+"""Entries of a boat besides its name and kind, in the order files have them."""
 
 
 def _check_number(who: str, name: str, value: object, low: float = 0.0) -> None:
@@ -59,7 +107,7 @@ class Platform:
     deceleration means none. Integrators use ``max_turn_rate_dps``, ``max_acc`` and ``max_angular_acc_dps2``.
     ``kind="rate"`` turns by a rate loop, see `rate`: besides those it uses ``max_dec`` (0: as ``max_acc``),
     ``turn_rate_at_rest_dps``, ``turn_rate_per_mps``, ``turn_lag_s``, ``speed_lag_s``, ``turn_loss`` and, of its
-    ``heading_pid``, ``kp`` in 1/s. `schema` has a word on each.
+    ``heading_pid``, ``kp`` in 1/s. `ENTRIES` has a word on each.
 
     When it is built it is run in its own model, once: it must come to its top speed, turn and stop.
 
@@ -96,10 +144,10 @@ class Platform:
         if not isinstance(self.kind, str) or self.kind not in KINDS:
             raise PlatformError(f"platform {self.name!r}: unknown kind {self.kind!r}; choose one of {sorted(KINDS)}")
         who = f"platform {self.name!r}"
-        for entry in fields(self):
-            if entry.name not in ("name", "kind", "thrust_map", "speed_pid", "heading_pid"):
-                low = -math.inf if entry.name in ("rotate_speed_dps", "turn_rate_per_mps") else 0.0
-                _check_number(who, entry.name, getattr(self, entry.name), low)
+        for name in ENTRIES:
+            if name not in ("thrust_map", "speed_pid", "heading_pid"):
+                low = -math.inf if name in ("rotate_speed_dps", "turn_rate_per_mps") else 0.0
+                _check_number(who, name, getattr(self, name), low)
         if self.max_speed_mps == 0:
             raise PlatformError(f"{who}: max_speed_mps is {self.max_speed_mps}; it must be > 0")
         if self.turn_loss > 1:
@@ -112,27 +160,26 @@ class Platform:
         except TypeError:
             raise PlatformError(f"{who}: thrust_map is {self.thrust_map!r}; give (thrust, speed) points") from None
         object.__setattr__(self, "thrust_map", points)
-        self._check_thrust_map()
-        self._check_rate()
+        self._check_thrust_map(who)
+        self._check_rate(who)
         fault = fault_of(self)
         if fault is not None:
             raise PlatformError(f"{who} is no boat that can be steered: in its own model, {fault}")
 
-    def _check_thrust_map(self) -> None:
+    def _check_thrust_map(self, who: str) -> None:
         for point in self.thrust_map:
             if len(point) != 2:
-                raise PlatformError(f"platform {self.name!r}: thrust_map holds {point}; give (thrust, speed) points")
+                raise PlatformError(f"{who}: thrust_map holds {point}; give (thrust, speed) points")
             for value in point:
-                _check_number(f"platform {self.name!r}", "thrust_map", value, -math.inf)
+                _check_number(who, "thrust_map", value, -math.inf)
         thrusts = [point[0] for point in self.thrust_map]
         if not 2 <= len(thrusts) <= L.MAP_CAPACITY or any(b <= a for a, b in pairwise(thrusts)):
             raise PlatformError(
-                f"platform {self.name!r}: thrust_map needs 2 to {L.MAP_CAPACITY} (thrust, speed) points "
-                f"with rising thrust, got {self.thrust_map}"
+                f"{who}: thrust_map needs 2 to {L.MAP_CAPACITY} (thrust, speed) points with rising thrust, got "
+                f"{self.thrust_map}"
             )
 
-    def _check_rate(self) -> None:
-        who = f"platform {self.name!r}"
+    def _check_rate(self, who: str) -> None:
         if self.kind == "rate":
             for name in ("max_acc", "max_turn_rate_dps", "max_angular_acc_dps2"):
                 if getattr(self, name) == 0:
@@ -140,34 +187,22 @@ class Platform:
             if self.heading_pid.kp == 0:
                 raise PlatformError(f"{who}: heading_pid.kp is 0; give deg/s asked for per deg of heading error")
             return
-        for name in ("turn_rate_at_rest_dps", "turn_rate_per_mps", "turn_lag_s", "speed_lag_s"):
-            if getattr(self, name) != 0:
+        for name, entry in ENTRIES.items():
+            if entry.kinds == RATE and getattr(self, name) != 0:
                 raise PlatformError(f"{who}: {name} is for boats of kind 'rate', this is a {self.kind!r}; leave it out")
 
     def pack(self) -> NDArray[np.float64]:
         """Parameter row for compiled code, shape ``(N_PARAM,)``, laid out as in `layout`."""
         row = np.zeros(L.N_PARAM)
         row[L.KIND] = KINDS[self.kind]
-        row[L.MAX_SPEED : L.ROTATE_SPEED + 1] = (
-            self.max_speed_mps,
-            self.speed_factor,
-            self.max_thrust,
-            self.max_rudder,
-            self.turn_loss,
-            self.turn_gain,
-            self.max_acc,
-            self.max_dec,
-            self.rotate_speed_dps,
-        )
-        speed, heading = self.speed_pid, self.heading_pid
-        row[L.SPEED_KP : L.SPEED_GAIN + 1] = speed.kp, speed.ki, speed.kd, speed.integral_limit, self.speed_gain
-        row[L.HEADING_KP : L.HEADING_LIMIT + 1] = heading.kp, heading.ki, heading.kd, heading.integral_limit
-        row[L.MAX_TURN_RATE] = self.max_turn_rate_dps
-        row[L.MAX_ANGULAR_ACC] = self.max_angular_acc_dps2
+        shared = [name for name, entry in ENTRIES.items() if entry.kinds != RATE and name != "thrust_map"]
+        own = [name for name, entry in ENTRIES.items() if entry.kinds == RATE] if self.kind == "rate" else []
+        for name in (*shared, *own):  # boats of kind rate have values of their own in columns that others use
+            value, column = getattr(self, name), ENTRIES[name].column
+            values = astuple(value) if isinstance(value, Gains) else (value,)
+            row[column : column + len(values)] = values
         if self.kind == "rate":
             row[L.MAX_DEC] = self.max_dec or self.max_acc
-            row[L.TURN_AT_REST], row[L.TURN_PER_SPEED] = self.turn_rate_at_rest_dps, self.turn_rate_per_mps
-            row[L.TURN_LAG], row[L.SPEED_LAG] = self.turn_lag_s, self.speed_lag_s
         row[L.MAP_SIZE] = len(self.thrust_map)
         for i, (thrust, speed_mps) in enumerate(self.thrust_map):
             row[L.MAP_THRUST + i] = thrust

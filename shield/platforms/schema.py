@@ -1,11 +1,10 @@
-"""What a platform file may say: each entry with its unit and a word on it, and which kinds of boats it is for."""
+"""What a platform file may say: words on kinds, gains and measured entries, and units that others use."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from .platform import ENTRIES, Entry
 
-ALL = ("usv", "rate", "double_integrator", "single_integrator")
-USV, RATE = ("usv",), ("rate",)
+__all__ = ["ENTRIES", "GAINS", "KIND_WORDS", "MEASURED", "UNITS_TAKEN_FOR_OTHERS"]
 
 KIND_WORDS = {
     "usv": "rudder and thrust behind a PID (MOOS-IvP's uSimMarine and pMarinePID): it turns with its thrust",
@@ -14,48 +13,6 @@ KIND_WORDS = {
     "single_integrator": "speed and turn rate are there at once",
 }
 
-
-@dataclass(frozen=True)
-class Entry:
-    """One entry of a file.
-
-    Attributes:
-        unit: of its value; empty: none.
-        words: what it is.
-        kinds: of boats it is for.
-    """
-
-    unit: str
-    words: str
-    kinds: tuple[str, ...] = ALL
-
-
-ENTRIES: dict[str, Entry] = {
-    "max_speed_mps": Entry("m/s", "top speed"),
-    "max_acc": Entry("m/s2", "limit on gaining speed; of kind usv 0 is none", ("usv", "rate", "double_integrator")),
-    "max_dec": Entry("m/s2", "limit on losing speed; 0: of kind rate as max_acc, of kind usv none", ("usv", "rate")),
-    "speed_lag_s": Entry("s", "lag of the speed behind its command", RATE),
-    "max_turn_rate_dps": Entry(
-        "deg/s", "highest turn rate at any speed", ("rate", "double_integrator", "single_integrator")
-    ),
-    "max_angular_acc_dps2": Entry("deg/s2", "limit on changing the turn rate", ("rate", "double_integrator")),
-    "turn_rate_at_rest_dps": Entry("deg/s", "highest turn rate without way; 0: it has to go to steer", RATE),
-    "turn_rate_per_mps": Entry("deg/s per m/s", "turn rate gained with speed; below 0: two propellers lose it", RATE),
-    "turn_lag_s": Entry("s", "lag of the turn rate behind what is asked for", RATE),
-    "turn_loss": Entry("share", "of speed lost at full rudder, or at the highest turn rate; 0 to 1", ("usv", "rate")),
-    "heading_pid": Entry(
-        "", "heading controller: rudder percent per deg (usv), deg/s per deg (rate: kp alone)", ("usv", "rate")
-    ),
-    "thrust_map": Entry("percent, m/s", "(thrust, steady speed) points, thrust rising", USV),
-    "speed_factor": Entry("percent per m/s", "thrust per commanded speed; 0: speed_pid changes the thrust", USV),
-    "max_thrust": Entry("percent", "largest thrust", USV),
-    "max_rudder": Entry("percent", "largest rudder", USV),
-    "turn_gain": Entry("deg/s", "turn rate at full rudder and thrust 50; twice that at thrust 100", USV),
-    "rotate_speed_dps": Entry("deg/s", "turn rate that is always there", USV),
-    "speed_gain": Entry("percent per output", "of speed_pid, added to the thrust in each step", USV),
-    "speed_pid": Entry("", "speed controller: output per m/s", USV),
-}
-"""Entries of a boat besides its name and kind, in the order files have them."""
 
 GAINS = {
     "kp": "proportional gain",

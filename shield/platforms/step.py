@@ -1,26 +1,92 @@
-"""One step of any platform: the single place where dynamics are chosen by kind."""
+"""One step of any platform: the single place where dynamics are chosen by kind; and commands held for several moves.
+
+Games may ask for a command once and move the boat several times by it, subtracting no turn made meanwhile: what is held
+is the error, not the course. A parameter row with one entry more, `layout.MOVE_S`, says how long a move of the boat is;
+a longer step is then made of several. Rows without it are of boats whose every step is one move.
+"""
 
 from __future__ import annotations
 
 from ..jit import Array, lean_kernel
 from . import layout as L
-from .held import moves_in
-from .integrators import step_double_integrator, step_single_integrator
-from .rate import step_rate
-from .usv import step_usv
+from .rate import step_double_integrator, step_rate, step_single_integrator
+from .usv import clamp, controller, next_speed, next_thrust, step_usv, turn_of_rudder
+
+HALVINGS = 44
+"""Halvings of the range of heading errors, 358 deg, that leave 1e-11 deg of it."""
+
+
+@lean_kernel
+def moves_in(params: Array, dt_s: float) -> int:
+    """Moves of the boat in a step."""
+    if params.shape[0] <= L.MOVE_S:
+        return 1
+    return max(1, int(dt_s / params[L.MOVE_S] + 0.5))
+
+
+@lean_kernel
+def _next_speed(params: Array, speed_mps: float, thrust: float, rudder: float, move_s: float) -> float:
+    """Speed stored after a move, m/s, as `usv.move_along_mean` stores it."""
+    return clamp(0.5 * (next_speed(params, speed_mps, thrust, rudder, move_s) + speed_mps), 0.0, params[L.MAX_SPEED])
+
+
+@lean_kernel
+def turn_at_rudder(params: Array, state: Array, speed_mps: float, rudder: float, move_s: float, moves: int) -> float:
+    """Turn, deg, of a thrust boat in so many moves with the rudder, percent, held; ``state`` is left as it is."""
+    speed, thrust = state[L.SPEED], state[L.THRUST]
+    error, integral, turn = state[L.SPEED_ERROR], state[L.SPEED_INTEGRAL], 0.0
+    for _ in range(moves):
+        thrust, error, integral = next_thrust(params, speed, thrust, error, integral, speed_mps, move_s)
+        made = rudder if thrust > 0.0 else 0.0
+        turn += turn_of_rudder(params, thrust, made, move_s)
+        speed = _next_speed(params, speed, thrust, made, move_s)
+    return turn
+
+
+@lean_kernel
+def turn_of_error(params: Array, state: Array, speed_mps: float, error_deg: float, move_s: float, moves: int) -> float:
+    """Turn, deg, that the autopilot of a thrust boat makes of a heading error held for so many moves."""
+    speed, thrust, last, memory = state[L.SPEED], state[L.THRUST], state[L.HEADING_ERROR], state[L.HEADING_INTEGRAL]
+    error, integral, turn = state[L.SPEED_ERROR], state[L.SPEED_INTEGRAL], 0.0
+    limit = min(params[L.MAX_RUDDER], 100.0)
+    kp, ki, kd, most = (
+        params[L.HEADING_KP],
+        params[L.HEADING_KI],
+        params[L.HEADING_KD],
+        params[L.HEADING_LIMIT],
+    )
+    for _ in range(moves):
+        thrust, error, integral = next_thrust(params, speed, thrust, error, integral, speed_mps, move_s)
+        rudder = 0.0
+        if thrust > 0.0:
+            output, memory = controller(kp, ki, kd, most, error_deg, last, memory, move_s)
+            rudder, last = clamp(output, -limit, limit), error_deg
+        turn += turn_of_rudder(params, thrust, rudder, move_s)
+        speed = _next_speed(params, speed, thrust, rudder, move_s)
+    return turn
+
+
+@lean_kernel
+def error_for_turn(
+    params: Array, state: Array, speed_mps: float, turn_deg: float, farthest_deg: float, move_s: float, moves: int
+) -> float:
+    """Heading error, deg, to hold so that the boat turns by that much in so many moves, or as nearly as it can.
+
+    The turn grows with the error, so the range of errors is halved until they meet.
+    """
+    low, high = -farthest_deg, farthest_deg
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        if turn_of_error(params, state, speed_mps, middle, move_s, moves) < turn_deg:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
 
 
 @lean_kernel
 def step_boat(params: Array, state: Array, desired_speed_mps: float, heading_error_deg: float, dt_s: float) -> None:
-    """Advance one boat by one step, in place, in one move or in several under the same command, see `held`.
-
-    Args:
-        params: platform row, shape ``(N_PARAM,)``.
-        state: state row, shape ``(N_STATE,)``.
-        desired_speed_mps: commanded speed, m/s.
-        heading_error_deg: commanded heading minus present heading, deg, as the autopilot is given it.
-        dt_s: step, s.
-    """
+    """Advance one boat's ``state`` by one step, in one move or several, under a speed, m/s, and heading error, deg."""
     moves = moves_in(params, dt_s)
     for _ in range(moves):
         _move_boat(params, state, desired_speed_mps, heading_error_deg, dt_s / moves)

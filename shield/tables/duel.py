@@ -56,14 +56,7 @@ def best_rudders(
 ) -> tuple[float, float, float]:
     """Value of the best own rudder against the other's answer, and both rudders (share of full).
 
-    Args:
-        tables: the tables.
-        table: which one.
-        params: parameter rows of the own boat and the other, shape ``(2, N_PARAM)``.
-        own: own state row.
-        other: the other's state row.
-        cooperative: whether the other helps.
-        steps: sub-steps of a table step.
+    ``params`` (2, N_PARAM) and state rows are those of the own boat and the other; a table step has so many ``steps``.
     """
     own_trails, own_ends = np.empty((N_RUDDERS, steps, 2)), np.empty((N_RUDDERS, 2))
     trails, ends = np.empty((N_RUDDERS, steps, 2)), np.empty((N_RUDDERS, 2))
@@ -117,18 +110,9 @@ def duel(
     table_steps: int,
     steps: int,
 ) -> float:
-    """Closest distance, m, over a run of the full model; changes both state rows.
+    """Closest distance, m, over a run of the full model of so many ``steps``; changes both state rows.
 
-    Args:
-        tables: the tables.
-        table: which one.
-        params: parameter rows of the own boat and the other, shape ``(2, N_PARAM)``.
-        own: own state row.
-        other: the other's state row.
-        manner: what the other boat does.
-        cooperative: whether both play the table's joint best.
-        table_steps: sub-steps of a table step.
-        steps: steps of the run.
+    Arguments as of `best_rudders`; ``manner`` is what the other does where both do not play the table's joint best.
     """
     nearest = math.sqrt((own[L.X] - other[L.X]) ** 2 + (own[L.Y] - other[L.Y]) ** 2)
     for _ in range(steps):

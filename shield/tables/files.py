@@ -1,16 +1,21 @@
-"""Value tables on disk: shipped with the package or made on demand, checked whenever they are read."""
+"""Value tables on disk, shipped with the package or made on demand and checked whenever they are read, and their cards.
+
+A card says what a table was solved for and how good it is; it is kept as JSON inside the table's file.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import io
+import json
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,28 +23,90 @@ from numpy.typing import NDArray
 from ..exceptions import TableError
 from ..platforms.platform import Platform
 from ..platforms.registry import PLATFORMS, get_platform
-from .card import Card, platform_digest
+from .grid import Grid
 from .lookup import LEVELS_S, N_LEVELS, STEPS, Tables, no_tables, pack
 from .settings import OtherMay, Problem, read_other_may, table_name
-from .solve import Progress
+from .solve import Progress, write_whole
 
 CACHE_VARIABLE = "STEERCLEAR_TABLES"
 """Environment variable that names the folder of tables made on demand."""
 SHIPPED = Path(__file__).parent / "shipped"
+FORMAT = 1
+"""Version of the table files."""
+
+
+def platform_digest(platform: Platform) -> str:
+    """Digest of a platform's parameters; a table is valid for exactly these."""
+    return hashlib.sha256(platform.pack().tobytes()).hexdigest()[:16]
+
+
+@dataclass(frozen=True)
+class Card:
+    """What a value table is.
+
+    The table is valid for an own boat whose thrust is at its maximum; its other boat may have any thrust.
+    """
+
+    own: str  # platforms' names
+    other: str
+    own_parameters: str  # digests of their parameters
+    other_parameters: str
+    other_may: str  # what the other boat is granted
+    grid: dict[str, Any]  # nodes of the table, as of `Grid`
+    dt_s: float  # table step and longest play, s
+    horizon_s: float
+    iterations: int  # steps done until the end
+    residual_m: float  # largest change of a value in the last step, m
+    payload_sha256: str = ""  # digest of the packed values
+    version: str = ""  # version of the package that solved it
+    checked_radii_m: tuple[float, ...] = ()  # separation radii for which convergence and margin were checked, m
+    # share by which the sets {V < radius} change on a coarser grid, by radius
+    convergence: dict[str, Any] = field(default_factory=dict)
+    # areas of {V < radius}, m^2, by radius and speed pair, over relative headings
+    areas_m2: dict[str, Any] = field(default_factory=dict)
+    model_error: dict[str, Any] = field(default_factory=dict)  # error of the reduced model against the full one
+    # outcome of closed-loop runs of the full model; empty when not run
+    margin: dict[str, Any] = field(default_factory=dict)
+    levels_s: tuple[float, ...] = ()  # shorter times T for which V(x, T) is kept as well, s
+    # how far ahead, m, the set {V(x, T) < radius} reaches head-on at top speeds, by T and radius
+    levels: dict[str, Any] = field(default_factory=dict)
+    format: int = FORMAT
+
+    def to_json(self) -> str:
+        """The card as text."""
+        return json.dumps(asdict(self), indent=1, sort_keys=True)
+
+    @staticmethod
+    def of_json(text: str) -> Card:
+        """Read a card.
+
+        Raises:
+            TableError: the text is no card of this version of the format.
+        """
+        try:
+            content = json.loads(text)
+            content["checked_radii_m"] = tuple(content["checked_radii_m"])
+            content["levels_s"] = tuple(content.get("levels_s", ()))
+            card = Card(**content)
+            card.make_grid()
+        except (ValueError, TypeError, KeyError) as error:
+            raise TableError(f"the table's card cannot be read ({error})") from error
+        if card.format != FORMAT:
+            raise TableError(f"the table's format is {card.format}, this version of the package reads {FORMAT}")
+        return card
+
+    def make_grid(self) -> Grid:
+        """The grid of the table."""
+        return Grid(**self.grid)
 
 
 @dataclass(frozen=True)
 class ValueTable:
-    """A packed table and its card.
+    """A packed table and its card."""
 
-    Attributes:
-        card: what it is.
-        values: uint8 over the grid, in steps of cap / 255, rounded down; for the whole play.
-        levels: the same for each time of the card's ``levels_s``, shape ``(levels, *grid)``; no lower than ``values``.
-    """
-
-    card: Card
-    values: NDArray[np.uint8]
+    card: Card  # what it is
+    values: NDArray[np.uint8]  # uint8 over the grid, in steps of cap / 255, rounded down; for the whole play
+    # the same for each time of the card's ``levels_s``, shape ``(levels, *grid)``; no lower than ``values``
     levels: NDArray[np.uint8]
 
     def values_m(self) -> NDArray[np.float64]:
@@ -119,13 +186,7 @@ def save_table(table: ValueTable, path: Path) -> None:
     memory = io.BytesIO()
     more = _more(table.levels, table.values)
     np.savez_compressed(memory, card=np.array(table.card.to_json()), steps=np.moveaxis(steps, 3, 0), more=more)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part = path.with_name(path.name + ".part")
-        part.write_bytes(memory.getvalue())
-        part.replace(path)
-    except OSError as error:
-        raise TableError(f"table {path} cannot be written ({error}); choose another place with --out") from error
+    write_whole(path, memory.getvalue(), "table", "choose another place with --out")
 
 
 def read_table(path: Path) -> ValueTable:
@@ -202,11 +263,7 @@ def _load(own: Platform, other: Platform, mode: OtherMay, folder: str) -> ValueT
 
 
 def check_parameters(card: Card, own: Platform, other: Platform, mode: OtherMay) -> None:
-    """Raise unless the card is for these boats and this mode.
-
-    Raises:
-        TableError: it is for others.
-    """
+    """Raise a `TableError` unless the card is for these boats and this mode."""
     found, wanted = (card.own, card.other, card.other_may), (own.name, other.name, mode.value)
     if found != wanted:
         texts = ("{} with {}, {}".format(*names) for names in (found, wanted))
@@ -217,10 +274,7 @@ def check_parameters(card: Card, own: Platform, other: Platform, mode: OtherMay)
 
 
 def stack_tables(tables: Sequence[ValueTable]) -> Tables:
-    """Put tables behind one another for compiled code; table i of the result is ``tables[i]``.
-
-    A table that keeps no shorter times tells of the whole play whatever time is asked for: no less than that is feared.
-    """
+    """Put tables behind one another; one without shorter times tells of the whole play at any time."""
     if not tables:
         return no_tables()
     blocks: list[NDArray[np.uint8]] = []

@@ -108,30 +108,21 @@ class Grid:
     Order of the values: (range, relative heading, bearing, own speed, other's speed), row-major. Relative heading
     is periodic from 0; bearing covers 0 to 180 deg, the other side is its mirror image; speeds start at 0.
 
-    Attributes:
-        rho_first_m: smallest range, m; nearer than that the value is the range itself.
-        rho_last_m: largest range, m.
-        n_rho, n_psi, n_beta: number of ranges, relative headings, bearings.
-        n_own, n_other: number of speeds of the own boat and of the other.
-        own_top_mps, other_top_mps: the highest speeds, m/s.
-        rho_ratio: spacing of the farthest ranges over that of the nearest.
-        cap_m: values above this are not told apart, m.
-
     Raises:
         TableError: too few nodes, or ranges or speeds out of order.
     """
 
-    rho_last_m: float
-    n_rho: int
+    rho_last_m: float  # largest range, m
+    n_rho: int  # number of ranges, relative headings, bearings
     n_psi: int
     n_beta: int
-    n_own: int
+    n_own: int  # number of speeds of the own boat and of the other
     n_other: int
-    own_top_mps: float
+    own_top_mps: float  # the highest speeds, m/s
     other_top_mps: float
-    rho_first_m: float = 1.0
-    rho_ratio: float = 5.0
-    cap_m: float = 6.0
+    rho_first_m: float = 1.0  # smallest range, m; nearer than that the value is the range itself
+    rho_ratio: float = 5.0  # spacing of the farthest ranges over that of the nearest
+    cap_m: float = 6.0  # values above this are not told apart, m
 
     def __post_init__(self) -> None:
         if min(self.n_rho, self.n_psi, self.n_beta, self.n_own, self.n_other) < 2:

@@ -41,17 +41,11 @@ N_LEVELS = len(LEVELS_S) + 1
 
 
 class Tables(NamedTuple):
-    """Several value tables behind one another, for compiled code.
+    """Several value tables behind one another, for compiled code."""
 
-    Attributes:
-        data: all values, uint8, in steps of cap / 255.
-        level: where each table's levels begin, the last for the whole play, shape ``(n_tables, N_LEVELS)``.
-        axes: each table's grid, shape ``(n_tables, N_AXES)``.
-    """
-
-    data: NDArray[np.uint8]
-    level: IntArray
-    axes: Array
+    data: NDArray[np.uint8]  # all values, uint8, in steps of cap / 255
+    level: IntArray  # where each table's levels begin, the last for the whole play, shape ``(n_tables, N_LEVELS)``
+    axes: Array  # each table's grid, shape ``(n_tables, N_AXES)``
 
 
 class Gradient(NamedTuple):
@@ -111,27 +105,24 @@ def _angle_places(
 
 
 @lean_kernel
-def _level_of(tables: Tables, table: int, fear_s: float) -> tuple[int, float]:
-    """The level below a time T, -1 for the distance itself, and the share of the way to the next one.
-
-    That for the whole play from `WHOLE_S` on, and of tables that keep no other.
-    """
+def _level_of(tables: Tables, table: int, horizon_s: float) -> tuple[int, float]:
+    """The level below a time T, -1 for the distance itself, and the share of the way to the next one."""
     level = tables.level[table]
-    if fear_s >= WHOLE_S or level[0] == level[N_LEVELS - 1]:
+    if horizon_s >= WHOLE_S or level[0] == level[N_LEVELS - 1]:
         return N_LEVELS - 1, 0.0
     low, low_s = -1, 0.0
     for k in range(N_LEVELS - 1):
-        if fear_s < LEVELS_S[k]:
-            return low, (fear_s - low_s) / (LEVELS_S[k] - low_s)
+        if horizon_s < LEVELS_S[k]:
+            return low, (horizon_s - low_s) / (LEVELS_S[k] - low_s)
         low, low_s = k, LEVELS_S[k]
-    return low, (fear_s - low_s) / (WHOLE_S - low_s)
+    return low, (horizon_s - low_s) / (WHOLE_S - low_s)
 
 
 @lean_kernel
 def table_value(
     tables: Tables,
     table: int,
-    fear_s: float,
+    horizon_s: float,
     dx_m: float,
     dy_m: float,
     own_heading_rad: float,
@@ -141,16 +132,8 @@ def table_value(
 ) -> float:
     """Distance, m, that the own boat can keep from now on, at most the cap; NaN when an input is not finite.
 
-    Args:
-        tables: the tables.
-        table: which one.
-        fear_s: time T for which the other does its worst, s; from `WHOLE_S` on the whole play. Interpolated.
-        dx_m: the other's position minus the own one, east, m.
-        dy_m: the same, north, m.
-        own_heading_rad: own heading, rad, clockwise from north.
-        other_heading_rad: the other's heading, rad, clockwise from north.
-        own_speed_mps: own stored speed, m/s; outside the table it is clamped.
-        other_speed_mps: the other's stored speed, m/s, likewise.
+    The other does its worst for a time T, ``horizon_s``, from `WHOLE_S` on the whole play; between levels interpolated.
+    Positions are the other's minus the own, headings clockwise from north, speeds clamped to the table's.
     """
     if not math.isfinite(dx_m + dy_m + own_heading_rad + other_heading_rad + own_speed_mps + other_speed_mps):
         return math.nan
@@ -160,7 +143,7 @@ def table_value(
         return rho
     psi, beta, _ = _angle_places(axes, math.atan2(dx_m, dy_m), own_heading_rad, other_heading_rad)
     own, other = _speed_places(axes, own_speed_mps, other_speed_mps)
-    low, part = _level_of(tables, table, fear_s)
+    low, part = _level_of(tables, table, horizon_s)
     value = 0.0
     for k in range(low, low + (2 if part > 0.0 else 1)):
         share = part if k > low else 1.0 - part
@@ -176,7 +159,7 @@ def table_value(
 def table_gradient(
     tables: Tables,
     table: int,
-    fear_s: float,
+    horizon_s: float,
     dx_m: float,
     dy_m: float,
     own_heading_rad: float,
@@ -194,7 +177,7 @@ def table_gradient(
     rho = math.sqrt(dx_m * dx_m + dy_m * dy_m)
     if rho < tables.axes[table, RHO_FIRST]:
         return _slope_of_distance(math.inf, dx_m, dy_m, rho)
-    low, part = _level_of(tables, table, fear_s)
+    low, part = _level_of(tables, table, horizon_s)
     value = x = y = heading = speed = other_heading = other_speed = 0.0
     for k in range(low, low + (2 if part > 0.0 else 1)):
         share = part if k > low else 1.0 - part

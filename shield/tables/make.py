@@ -69,11 +69,7 @@ def _second(checkpoint: Path | None) -> Path | None:
 
 
 def check_radii(problem: Problem, radii_m: tuple[float, ...]) -> None:
-    """Raise unless the radii lie well inside the table's values.
-
-    Raises:
-        TableError: one does not.
-    """
+    """Raise a `TableError` unless the radii lie well inside the table's values."""
     low, high = problem.grid.rho_first_m, 0.8 * problem.grid.cap_m
     for radius in radii_m:
         if not low < radius <= high:

@@ -27,16 +27,11 @@ class Moves:
     """What one table step does to a boat, for each speed node and rudder.
 
     Frame: x to starboard, y ahead of the heading at the start; turns clockwise.
-
-    Attributes:
-        place_m: positions after each sub-step, shape ``(speeds, rudders, sub_steps, 2)``.
-        turn_rad: heading change of the whole step, shape ``(speeds, rudders)``.
-        speed_mps: stored speed after the step, shape ``(speeds, rudders)``.
     """
 
-    place_m: Array
-    turn_rad: Array
-    speed_mps: Array
+    place_m: Array  # positions after each sub-step, shape ``(speeds, rudders, sub_steps, 2)``
+    turn_rad: Array  # heading change of the whole step, shape ``(speeds, rudders)``
+    speed_mps: Array  # stored speed after the step, shape ``(speeds, rudders)``
 
 
 @kernel
@@ -60,11 +55,7 @@ def run_hull(params: Array, state: Array, rudder: float, steps: int, dt_s: float
 
 
 def sub_steps(dt_s: float) -> int:
-    """Sub-steps of a table step.
-
-    Raises:
-        TableError: the step is not a multiple of `SUB_STEP_S`.
-    """
+    """Sub-steps of a table step, which is a multiple of `SUB_STEP_S`."""
     count = round(dt_s / SUB_STEP_S)
     if count < 1 or abs(count * SUB_STEP_S - dt_s) > 1e-9:
         raise TableError(f"the step of a table is {dt_s:g} s; make it a multiple of {SUB_STEP_S:g} s")
@@ -72,11 +63,7 @@ def sub_steps(dt_s: float) -> int:
 
 
 def moves_of(platform: Platform, speeds_mps: Array, rudders: Array, dt_s: float) -> Moves:
-    """Moves of a platform from each speed with each rudder (share of full, -1 to 1) in one table step.
-
-    Raises:
-        TableError: the platform is no thrust-and-rudder boat, or the step does not fit.
-    """
+    """Moves of a platform from each speed with each rudder (share of full, -1 to 1) in one table step."""
     if platform.kind != "usv":
         raise TableError(
             f"platform {platform.name!r} is a {platform.kind}: value tables are for boats of kind 'usv'; "

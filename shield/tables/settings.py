@@ -43,23 +43,16 @@ class OtherMay(StrEnum):
 class Problem:
     """One pairwise game, ready to be solved.
 
-    Attributes:
-        own, other: the boats.
-        other_may: what the other boat is granted.
-        grid: nodes of the table.
-        dt_s: table step, s: rudders are held for so long.
-        horizon_s: play looked ahead at most, s.
-
     Raises:
         TableError: a setting is out of range.
     """
 
-    own: Platform
+    own: Platform  # the boats
     other: Platform
-    other_may: OtherMay
-    grid: Grid
-    dt_s: float
-    horizon_s: float
+    other_may: OtherMay  # what the other boat is granted
+    grid: Grid  # nodes of the table
+    dt_s: float  # table step, s: rudders are held for so long
+    horizon_s: float  # play looked ahead at most, s
 
     def __post_init__(self) -> None:
         sub_steps(self.dt_s)
@@ -78,11 +71,7 @@ def table_name(own: str, other: str, other_may: OtherMay) -> str:
 
 
 def read_other_may(text: str | OtherMay) -> OtherMay:
-    """The mode of that name.
-
-    Raises:
-        TableError: no mode has that name.
-    """
+    """The mode of that name."""
     try:
         return OtherMay(text)
     except ValueError:

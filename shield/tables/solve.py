@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import zipfile
 import zlib
@@ -15,11 +16,10 @@ from numpy.typing import NDArray
 
 from ..exceptions import TableError
 from ..jit import BoolArray
-from .active import widen
 from .lookup import LEVELS_S, pack
 from .moves import Moves, moves_of
 from .settings import RUDDERS, OtherMay, Problem, places
-from .sweep import Pursuit, Ways, sweep
+from .sweep import Pursuit, Ways, sweep, widen
 
 TOLERANCE_M = 5e-4
 """Smaller changes of a value within one step are left out."""
@@ -33,22 +33,14 @@ Notice = Callable[[int, int, float], None]
 
 @dataclass
 class Progress:
-    """A solve under way: what a checkpoint keeps.
+    """A solve under way: what a checkpoint keeps."""
 
-    Attributes:
-        values: flat values, m, float32.
-        hints: best rudders of each cell (own * 8 + other), uint8.
-        active: places (range, relative heading, bearing) that may still change.
-        iterations: steps done.
-        residual_m: largest change of the last step, m.
-        levels: packed values at each of `LEVELS_S` passed so far, uint8, ``(passed, size)``.
-    """
-
-    values: NDArray[np.float32]
-    hints: NDArray[np.uint8]
-    active: BoolArray
-    iterations: int = 0
-    residual_m: float = float("inf")
+    values: NDArray[np.float32]  # flat values, m, float32
+    hints: NDArray[np.uint8]  # best rudders of each cell (own * 8 + other), uint8
+    active: BoolArray  # places (range, relative heading, bearing) that may still change
+    iterations: int = 0  # steps done
+    residual_m: float = float("inf")  # largest change of the last step, m
+    # packed values at each of `LEVELS_S` passed so far, uint8, ``(passed, size)``
     levels: NDArray[np.uint8] = field(default_factory=lambda: np.zeros((0, 0), np.uint8))
 
 
@@ -154,15 +146,20 @@ def _reach(moves: Moves) -> float:
 
 
 def _keep(problem: Problem, state: Progress, path: Path) -> None:
-    """Write a checkpoint so that no half-written one is ever found."""
+    memory = io.BytesIO()
+    np.savez(memory, problem=np.array(repr(problem)), **vars(state))
+    write_whole(path, memory.getvalue(), "checkpoint", "name another with --checkpoint")
+
+
+def write_whole(path: Path, content: bytes, what: str, remedy: str) -> None:
+    """Write a file so that no half-written one is ever found under its name."""
     part = path.with_name(path.name + ".part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with part.open("wb") as file:
-            np.savez(file, problem=np.array(repr(problem)), **vars(state))
+        part.write_bytes(content)
         part.replace(path)
     except OSError as error:
-        raise TableError(f"checkpoint {path} cannot be written ({error}); name another with --checkpoint") from error
+        raise TableError(f"{what} {path} cannot be written ({error}); {remedy}") from error
 
 
 def _resume(problem: Problem, path: Path | None) -> Progress | None:

@@ -1,4 +1,4 @@
-"""Value iteration of one range of a grid, compiled."""
+"""Value iteration of one range of a grid, and which places can change next, compiled."""
 
 from __future__ import annotations
 
@@ -17,35 +17,21 @@ SNAP = 1e-7
 
 
 class Ways(NamedTuple):
-    """What one table step does to a boat: `moves.Moves`, with speeds as the grid has them.
+    """What one table step does to a boat: `moves.Moves`, with speeds as the grid has them."""
 
-    Attributes:
-        place_m: `Moves.place_m`.
-        turn_rad: `Moves.turn_rad`.
-        speed: speed cell and place in it after each move, shape ``(speeds, rudders, 2)``.
-    """
-
-    place_m: Array
-    turn_rad: Array
-    speed: Array
+    place_m: Array  # `Moves.place_m`
+    turn_rad: Array  # `Moves.turn_rad`
+    speed: Array  # speed cell and place in it after each move, shape ``(speeds, rudders, 2)``
 
 
 class Pursuit(NamedTuple):
-    """A game of two boats on a grid.
+    """A game of two boats on a grid."""
 
-    Attributes:
-        axes: description of the grid.
-        own: moves of the own boat.
-        other: moves of the other boat.
-        cooperative: whether the other boat helps.
-        reach_m: how far the two boats together can move in one step, m.
-    """
-
-    axes: Array
-    own: Ways
-    other: Ways
-    cooperative: bool
-    reach_m: float
+    axes: Array  # description of the grid
+    own: Ways  # moves of the own boat
+    other: Ways  # moves of the other boat
+    cooperative: bool  # whether the other boat helps
+    reach_m: float  # how far the two boats together can move in one step, m
 
 
 class Move(NamedTuple):
@@ -146,8 +132,7 @@ def cell_value(
 ) -> tuple[float, int]:
     """Best the own boat can get from here, no higher than ``old``, and the rudders (own * 8 + other) of it.
 
-    The boats are at their speed nodes a and b. The own rudder of the hint is tried first, each answer of the other that
-    hurt last is tried first.
+    The own rudder of the hint is tried first, and of the other's answers the one that hurt last.
     """
     sin, cos = math.sin(psi), math.cos(psi)
     n_own, n_other, cooperative = game.own.turn_rad.shape[1], game.other.turn_rad.shape[1], game.cooperative
@@ -192,20 +177,10 @@ def sweep(
     tolerance_m: float,
     row: int,
 ) -> float:
-    """Value iteration of one range: reads ``values``, lowers ``out``.
+    """Value iteration of a range: reads ``values``, lowers ``out``, a copy of them; returns the largest change, m.
 
-    Args:
-        values: flat values over the grid, m.
-        out: a copy of them, lowered in place.
-        hints: best rudders of each cell, kept from one iteration to the next.
-        active: places (range, relative heading, bearing) that may change; others are skipped.
-        changed: set to True for the places that did change.
-        game: the two boats, and the grid.
-        tolerance_m: smaller changes are left out, m.
-        row: range index.
-
-    Returns:
-        The largest change, m.
+    Places that are not ``active`` are skipped, those that change are set in ``changed``; smaller changes than the
+    tolerance are left out. ``hints`` are the best rudders of each cell, kept from one iteration to the next.
     """
     axes = game.axes
     n_psi, n_beta = int(axes[N_PSI]), int(axes[N_BETA])
@@ -230,3 +205,71 @@ def sweep(
                         largest = max(largest, old - new)
                     at += 1
     return largest
+
+
+@kernel
+def widen(changed: BoolArray, axes: Array, reach_m: float, own_turn_rad: float, psi_turn_rad: float) -> BoolArray:
+    """Places (range, relative heading, bearing) from which one step leads to a changed one, or its mirror image.
+
+    In a step the boats together move ``reach_m``, the own boat and the relative heading turn by so many rad.
+    """
+    n_rho, n_psi, n_beta = changed.shape
+    near = _over_headings(_over_ranges(changed, axes, reach_m), psi_turn_rad)
+    active = np.zeros((n_rho, n_psi, n_beta), np.bool_)
+    for i in range(n_rho):
+        reach_beta = own_turn_rad + math.asin(min(reach_m / rho_node(axes, i), 1.0))
+        if rho_node(axes, i) <= reach_m:
+            reach_beta = math.pi
+        width = min(math.ceil(reach_beta / math.pi * (n_beta - 1) + 1e-6) + 1, n_beta)
+        for j in range(n_psi):
+            for k in range(n_beta):
+                if near[i, j, k]:
+                    for m in range(k - width, k + width + 1):
+                        _mark(active, i, j, m)
+    return active
+
+
+@kernel
+def _mark(active: BoolArray, i: int, j: int, k: int) -> None:
+    """Mark a place; bearings beyond dead ahead or dead astern are those of the mirror image."""
+    n_psi, last = active.shape[1], active.shape[2] - 1
+    if 0 <= k <= last:
+        active[i, j, k] = True
+        if k == 0 or k == last:
+            active[i, (-j) % n_psi, k] = True
+    else:
+        active[i, (-j) % n_psi, min(max(-k if k < 0 else 2 * last - k, 0), last)] = True
+
+
+@kernel
+def _over_ranges(changed: BoolArray, axes: Array, reach_m: float) -> BoolArray:
+    n_rho, n_psi, n_beta = changed.shape
+    near = np.zeros((n_rho, n_psi, n_beta), np.bool_)
+    low = 0
+    for i in range(n_rho):
+        rho = rho_node(axes, i)
+        while low < i and rho_node(axes, low + 1) < rho - reach_m:
+            low += 1
+        high = i
+        while high < n_rho - 1 and rho_node(axes, high) < rho + reach_m:
+            high += 1
+        for m in range(low, high + 1):
+            for j in range(n_psi):
+                for k in range(n_beta):
+                    if changed[m, j, k]:
+                        near[i, j, k] = True
+    return near
+
+
+@kernel
+def _over_headings(changed: BoolArray, psi_turn_rad: float) -> BoolArray:
+    n_rho, n_psi, n_beta = changed.shape
+    near = np.zeros((n_rho, n_psi, n_beta), np.bool_)
+    width = min(math.ceil(psi_turn_rad / (2.0 * math.pi) * n_psi - 1e-6), n_psi // 2)
+    for i in range(n_rho):
+        for j in range(n_psi):
+            for k in range(n_beta):
+                if changed[i, j, k]:
+                    for d in range(-width, width + 1):
+                        near[i, (j + d) % n_psi, k] = True
+    return near

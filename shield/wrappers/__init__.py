@@ -8,8 +8,7 @@ from ..extras import install_command
 from .games_shield import games_shield
 from .parallel import ShieldedParallelEnv
 from .policy import ShieldedCallable, ShieldedTeamPolicy
-from .readers import game_reader, reader_of
-from .reading import GameReader
+from .readers import GameReader, game_reader, reader_of
 from .team_batch import TeamBatch
 from .vector_gym import MctfVectorEnv
 

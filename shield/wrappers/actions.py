@@ -29,37 +29,22 @@ Command = tuple[float, float]
 
 
 class Seat(NamedTuple):
-    """What is known of the boat whose action is read.
+    """What is known of the boat whose action is read."""
 
-    Attributes:
-        name: of the boat, for messages.
-        top_mps: its top speed, m/s.
-        to_point: the command that steers for a field point; None where there are none.
-        points: names of the field points, where they are known.
-        numbered: whole numbers are field points, not discrete actions.
-        lowest: lowest number of a discrete action; they count from the end, as Python's indices do.
-        bools: True and False are numbers.
-        longer: of more than two entries the first two count.
-        pairs: pairs are played as well as numbers.
-    """
-
-    name: str
-    top_mps: float
+    name: str  # of the boat, for messages
+    top_mps: float  # its top speed, m/s
+    # the command that steers for a field point; None where there are none
     to_point: Callable[[str], Command] | None = None
-    points: Sequence[str] = ()
-    numbered: bool = False
-    lowest: int = -1
-    bools: bool = False
-    longer: bool = False
-    pairs: bool = True
+    points: Sequence[str] = ()  # names of the field points, where they are known
+    numbered: bool = False  # whole numbers are field points, not discrete actions
+    lowest: int = -1  # lowest number of a discrete action; they count from the end, as Python's indices do
+    bools: bool = False  # True and False are numbers
+    longer: bool = False  # of more than two entries the first two count
+    pairs: bool = True  # pairs are played as well as numbers
 
 
 def check_agents(actions: Any, agent_ids: Sequence[str]) -> None:
-    """Check that actions are a dict of known boats; missing ones stop.
-
-    Raises:
-        GameError: they are not.
-    """
+    """Check that actions are a dict of known boats; missing ones stop."""
     if not isinstance(actions, Mapping):
         raise GameError(f"actions are a {type(actions).__name__}; give a dict of agent id -> action")
     for agent_id in actions:
@@ -83,11 +68,7 @@ def read_action(seat: Seat, action: Any) -> Command:
 
 
 def plain_action(seat: Seat, action: Any) -> int | str | Command:
-    """An action as its plainest form: a number 0..16, a field point's name, or a pair of floats.
-
-    Raises:
-        GameError: as in `read_action`; a name is not looked up.
-    """
+    """An action as its plainest form: a number 0..16, a field point's name (not looked up), or a pair of floats."""
     if type(action) is int and seat.lowest <= action <= STOP and not seat.numbered:  # what most policies send,
         return action % len(DISCRETE)
     if _is_plain_pair(action):  # and the scripted ones
@@ -182,16 +163,9 @@ def short(what: Any, length: int = 80) -> str:
 
 
 def read_flat(actions: Any, top_mps: Array, seat_of: Callable[[int], Seat], pairs: bool) -> Array:
-    """Commands (n, 2) of the actions of n boats.
+    """Commands (n, 2) of the actions of n boats of top speeds (n,), m/s: an array, or n actions of any kind.
 
-    Args:
-        actions: n discrete numbers, or n pairs, as an array or anything that makes one; or n actions of any kind.
-        top_mps: (n,) top speeds, m/s.
-        seat_of: the seat of each boat, for messages.
-        pairs: arrays hold pairs.
-
-    Raises:
-        GameError: an action is none, or there are not n of them.
+    Arrays hold pairs, or discrete numbers; ``seat_of`` each boat is for messages.
     """
     n = len(top_mps)
     try:

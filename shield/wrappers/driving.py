@@ -21,23 +21,14 @@ LEAST_MPS = 1e-6
 
 
 class Drives(NamedTuple):
-    """How a game drives the n boats of two teams, blue first.
+    """How a game drives the n boats of two teams, blue first."""
 
-    Attributes:
-        marks: for each team, places (k, 2), m: its tagged boats are steered at the nearest.
-        ends: for each team, places (k, 2), m, near which tagged boats are free again.
-        near_m: how near that is; NaN: nobody knows the way of tagged boats, such as among obstacles.
-        size: of the field, m; boats out of bounds are steered straight off the nearest edge.
-        tagged_mps: speed, m/s, commanded to tagged boats, (n,) or one for all,
-        oob_mps: and to boats out of bounds.
-    """
-
-    marks: Sequence[Array]
-    ends: Sequence[Array]
-    near_m: float
-    size: Array
-    tagged_mps: Array
-    oob_mps: Array
+    marks: Sequence[Array]  # for each team, places (k, 2), m: its tagged boats are steered at the nearest
+    ends: Sequence[Array]  # for each team, places (k, 2), m, near which tagged boats are free again
+    near_m: float  # how near that is; NaN: nobody knows the way of tagged boats, such as among obstacles
+    size: Array  # of the field, m; boats out of bounds are steered straight off the nearest edge
+    tagged_mps: Array  # speed, m/s, commanded to tagged boats, (n,) or one for all,
+    oob_mps: Array  # and to boats out of bounds
 
 
 class Driven(NamedTuple):

@@ -18,44 +18,34 @@ from ..platforms import Platform, get_platform
 
 logger = logging.getLogger(__name__)
 
+_WHY = {"separation_m": "counts collisions", "obstacle_clearance_m": "has boats hit its obstacles"}
+
 
 class GameFacts(NamedTuple):
-    """Attributes of a game.
+    """Attributes of a game."""
 
-    Attributes:
-        dt_s: time the boats are moved by for one command, s.
-        radius_m: (n,) radius of each boat, m; two boats collide when no farther apart than the sum.
-        team: (n,) team of each boat.
-        obstacles: whether there are any, which boats hit by their radius.
-        decision_s: time that the boats are moved by for one answer of a policy, s; 0: the same.
-    """
-
-    dt_s: float
-    radius_m: Array
-    team: IntArray
-    obstacles: bool
-    decision_s: float = 0.0
+    dt_s: float  # time the boats are moved by for one command, s
+    radius_m: Array  # (n,) radius of each boat, m; two boats collide when no farther apart than the sum
+    team: IntArray  # (n,) team of each boat
+    obstacles: bool  # whether there are any, which boats hit by their radius
+    decision_s: float = 0.0  # time that the boats are moved by for one answer of a policy, s; 0: the same
 
     @property
     def moves(self) -> int:
         """Moves of the boats for one answer of a policy."""
         return max(1, round(self.decision_s / self.dt_s))
 
-    def collision_m(self, team: int | None = None) -> float:
-        """Largest distance at which a boat of the team (None: any boat) collides with another, m; 0 where none can."""
+    def distances(self, team: int | None = None) -> dict[str, float]:
+        """Largest distances, m, at which a boat of the team (None: any boat) hits another or an obstacle; 0: none."""
         ours = np.ones(len(self.team), bool) if team is None else self.team == team
         pairs = ours[:, None] & ~np.eye(len(ours), dtype=bool)
-        return float((self.radius_m[:, None] + self.radius_m)[pairs].max(initial=0.0))
-
-    def obstacle_clearance_m(self, team: int | None = None) -> float:
-        """Largest distance at which a boat of the team hits an obstacle, m; 0 where there is none."""
-        ours = np.ones(len(self.team), bool) if team is None else self.team == team
-        return float(self.radius_m[ours].max(initial=0.0)) if self.obstacles else 0.0
+        collision_m = float((self.radius_m[:, None] + self.radius_m)[pairs].max(initial=0.0))
+        clearance_m = float(self.radius_m[ours].max(initial=0.0)) if self.obstacles else 0.0
+        return {"separation_m": collision_m, "obstacle_clearance_m": clearance_m}
 
     def settings(self) -> dict[str, float]:
         """Settings of a shield for this game, by name."""
-        distances = {"separation_m": self.collision_m(), "obstacle_clearance_m": self.obstacle_clearance_m()}
-        return {"dt_s": self.dt_s, **{name: metres for name, metres in distances.items() if metres > 0.0}}
+        return {"dt_s": self.dt_s, **{name: metres for name, metres in self.distances().items() if metres > 0.0}}
 
 
 def facts_of_games(core: Any) -> GameFacts:
@@ -66,87 +56,76 @@ def facts_of_games(core: Any) -> GameFacts:
     )
 
 
-def check_step(config: ShieldConfig, facts: GameFacts) -> None:
-    """Refuse a game of another step than the shield's, which would foresee boats elsewhere than they go.
+def fitting(config: ShieldConfig, facts: GameFacts, team: int, held: bool = False) -> ShieldConfig:
+    """The settings for a game, whose distances replace those that nobody chose and that are smaller; the log says so.
+
+    A smaller one that was chosen stays: it may be meant, as where hits are counted at two radii. The log tells that.
+
+    Args:
+        config: a shield's settings.
+        facts: the game.
+        team: the team to shield.
+        held: the shield decides once for all moves that the game makes of a policy's answer, else before each.
 
     Raises:
-        ConfigError: it is one.
+        ConfigError: the settings are for another step, or another number of moves.
     """
+    config = _for_held_commands(config, facts) if held and facts.moves > 1 else _for_moves(config, facts)
+    larger: dict[str, Any] = {}
+    for name, metres in facts.distances(team).items():
+        if not config.said(name) and metres > getattr(config, name):
+            larger[name] = Unsaid(metres)
+            _warn_once(
+                f"no {name} was given: the shield keeps {metres:g} m, the distance at which this game {_WHY[name]}"
+            )
+    config = replace(config, **larger) if larger else config
+    warn_of_distances(config, facts, team)
+    return config
+
+
+def _for_moves(config: ShieldConfig, facts: GameFacts) -> ShieldConfig:
+    """The settings, if they are for a decision before each move: else boats would be predicted elsewhere."""
+    remedy = f"build it by Shield.for_game(game), or with dt_s={facts.dt_s:g}"
     if config.moves > 1:
         raise ConfigError(
             f"the shield decides once for {config.moves} moves of the boats (move_s), but is asked here before each; "
-            f"build it by Shield.for_game(game), or with dt_s={facts.dt_s:g}"
+            + remedy
         )
     if not math.isclose(config.dt_s, facts.dt_s, rel_tol=1e-9):
         raise ConfigError(
             f"the shield decides for steps of {config.dt_s:g} s (dt_s), but the game moves its boats by {facts.dt_s:g} "
-            f"s for each command; build it by Shield.for_game(game), or with dt_s={facts.dt_s:g}"
+            f"s for each command; {remedy}"
         )
+    return config
 
 
-def for_held_commands(config: ShieldConfig, facts: GameFacts) -> ShieldConfig:
-    """The settings of a shield that decides once for all moves that the game makes of one answer of a policy.
-
-    A shield for the moves themselves, as `Shield.for_game` builds it, is meant for such a game; so is one already made
-    for it.
-
-    Raises:
-        ConfigError: it is for moves of another length, or another number of them.
-    """
-    decision_s = facts.moves * facts.dt_s
-    given = config.moves > 1 or facts.moves == 1
+def _for_held_commands(config: ShieldConfig, facts: GameFacts) -> ShieldConfig:
+    """The settings for all moves at once, from those for the moves themselves, or already made so."""
+    given = config.moves > 1
     if not math.isclose(config.model_s, facts.dt_s, rel_tol=1e-9) or (given and config.moves != facts.moves):
-        steps = "" if config.moves == 1 else f", {config.moves} of them a command"
+        steps = f", {config.moves} of them a command" if given else ""
         raise ConfigError(
             f"the shield foresees moves of {config.model_s:g} s{steps}, but the game moves its boats {facts.moves} "
             f"time(s) by {facts.dt_s:g} s for each command; build it by Shield.for_game(game), or with "
             f"dt_s={facts.dt_s:g}"
         )
-    return config if given else replace(config, dt_s=decision_s, move_s=facts.dt_s)
-
-
-def with_distances(config: ShieldConfig, facts: GameFacts, team: int) -> ShieldConfig:
-    """The settings, with the game's distances where nobody chose one and the game's is larger; the log says so, once.
-
-    A larger distance than the default is what a shield round this game is for. A smaller one than the game's that was
-    chosen stays: it may be meant, as where hits are counted at two radii.
-    """
-    larger: dict[str, Any] = {}
-    for name, metres, why in _distances(facts, team):
-        if not config.said(name) and metres > getattr(config, name):
-            larger[name] = Unsaid(metres)
-            _log_once(
-                logging.WARNING,
-                f"no {name} was given: the shield keeps {metres:g} m, the distance at which this game {why}",
-            )
-    return replace(config, **larger) if larger else config
+    return config if given else replace(config, dt_s=facts.moves * facts.dt_s, move_s=facts.dt_s)
 
 
 def warn_of_distances(config: ShieldConfig, facts: GameFacts, team: int | None) -> None:
     """Log, once, that a shield keeps less than the distances of its game."""
-    for name, metres, why in _distances(facts, team):
-        kept_m = getattr(config, name)
-        if kept_m < metres - 1e-9:
-            _log_once(
-                logging.WARNING,
-                f"the shield keeps {kept_m:g} m ({name}), but this game {why} at {metres:g} m: such hits it does not "
-                f"prevent; build it by Shield.for_game(game) or games_shield(core), or give {name}={metres:g}",
+    for name, metres in facts.distances(team).items():
+        if getattr(config, name) < metres - 1e-9:
+            _warn_once(
+                f"the shield keeps {getattr(config, name):g} m ({name}), but this game {_WHY[name]} at {metres:g} m: "
+                f"such hits it does not prevent; build it by Shield.for_game(game) or games_shield(core), or give "
+                f"{name}={metres:g}"
             )
 
 
-def _distances(facts: GameFacts, team: int | None) -> tuple[tuple[str, float, str], ...]:
-    return (
-        ("separation_m", facts.collision_m(team), "counts collisions"),
-        ("obstacle_clearance_m", facts.obstacle_clearance_m(team), "has boats hit its obstacles"),
-    )
-
-
 @lru_cache(maxsize=256)
-def _log_once(level: int, words: str) -> None:
-    logger.log(level, words)
-
-
-REMEDY = "build the shield of these games with games_shield(core, config, team)"
+def _warn_once(words: str) -> None:
+    logger.warning(words)
 
 
 def platforms_of(core: Any) -> tuple[str | Platform, ...]:
@@ -158,36 +137,17 @@ def platforms_of(core: Any) -> tuple[str | Platform, ...]:
 def check_same_games(
     core: Any, games: int, platforms: Sequence[str | Platform], team: Sequence[int], dt_s: float
 ) -> None:
-    """Refuse games that a shield was not built for: it would foresee other boats than are there, or other steps.
-
-    Args:
-        core: the `BatchedMctf`.
-        games: number of games the shield decides for.
-        platforms: platforms of its boats.
-        team: their teams.
-        dt_s: step of its decisions, s.
-
-    Raises:
-        ConfigError: the games are not these.
-    """
-    ours, theirs = _names(platforms), _names(platforms_of(core))
+    """Refuse games that a shield was not built for: it would predict other boats than are there, or other steps."""
+    ours, theirs = (tuple(map(get_platform, kinds)) for kinds in (platforms, platforms_of(core)))
     for what, mine, others in (
         ("boats", ours, theirs),
-        ("teams", [int(one) for one in team], [int(one) for one in core.team]),
-        ("number of games", games, core.n_games),
-        ("step, s,", dt_s, core.config.dt_s),
+        ("teams", tuple(map(int, team)), tuple(map(int, core.team))),
+        ("number of games", (games,), (core.n_games,)),
+        ("step, s,", (dt_s,), (core.config.dt_s,)),
     ):
         if mine != others:
+            built, has = (", ".join(str(getattr(one, "name", one)) for one in values) for values in (mine, others))
             raise ConfigError(
-                f"the shield was built for {what} {_words(mine)}, the games have {_words(others)}; {REMEDY}"
+                f"the shield was built for {what} {built}, the games have {has}; build the shield of these games with "
+                "games_shield(core, config, team)"
             )
-
-
-def _names(platforms: Sequence[str | Platform]) -> list[Platform]:
-    return [get_platform(one) if isinstance(one, str) else one for one in platforms]
-
-
-def _words(value: Any) -> str:
-    if isinstance(value, list):
-        return ", ".join(one.name if isinstance(one, Platform) else str(one) for one in value)
-    return str(value)

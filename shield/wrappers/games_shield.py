@@ -8,17 +8,10 @@ from ..batch import BatchedShield
 from ..config import ShieldConfig
 from ..exceptions import ConfigError
 from ..jit import Array, BoolArray
+from .checks import team_number
 from .driving import driven_boats
-from .game_facts import (
-    check_same_games,
-    check_step,
-    facts_of_games,
-    platforms_of,
-    warn_of_distances,
-    with_distances,
-)
+from .game_facts import check_same_games, facts_of_games, fitting, platforms_of, warn_of_distances
 from .mctf import surroundings_of
-from .reading import team_number
 
 
 def games_shield(
@@ -46,26 +39,13 @@ def games_shield(
             f"config is a {type(config).__name__}; give a ShieldConfig, such as Shield.for_game(core).config"
         )
     number, facts = team_number(team), facts_of_games(core)
-    settings = ShieldConfig.of(**facts.settings()) if config is None else with_distances(config, facts, number)
-    check_step(settings, facts)
-    warn_of_distances(settings, facts, number)
+    settings = fitting(ShieldConfig.of(**facts.settings()) if config is None else config, facts, number)
     around = surroundings_of(core, number, keep_out)
     return BatchedShield(settings, core.n_games, platforms_of(core), tuple(core.team.tolist()), around, number, threads)
 
 
 def check_games(shield: BatchedShield, core: Any, team: int | None = None) -> None:
-    """Check that games are those a shield was built for: boats, teams, number and step.
-
-    The log says, once, if it keeps boats less far apart than the games count collisions.
-
-    Args:
-        shield: the shield.
-        core: the `BatchedMctf`.
-        team: the team it decides for; None: any.
-
-    Raises:
-        ConfigError: they are not.
-    """
+    """Check that games are those a shield was built for; the log says, once, if it keeps boats less far apart."""
     check_same_games(core, len(shield.reason), shield.platforms, shield.team, shield.config.dt_s)
     warn_of_distances(shield.config, facts_of_games(core), team)
 

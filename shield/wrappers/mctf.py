@@ -14,10 +14,14 @@ from ..fleet import Fleet
 from ..jit import Array
 from ..surroundings import Surroundings
 from .driving import driven_boats
-from .game_facts import GameFacts, facts_of_games
-from .reading import KEEP_OUT_MARGIN_M, obstacles_of
+from .game_facts import GameFacts, facts_of_games, platforms_of
+from .readers import game_reader
+
+KEEP_OUT_MARGIN_M = 0.1
+"""Distance kept beyond a flag's keep-out circle, m: the game throws boats back that touch it."""
 
 
+@game_reader(lambda env: hasattr(env, "core") and hasattr(env, "command_filter"))
 class MctfReader:
     """Reads an `MctfEnv`: exact state with the autopilots' memory, commands inside its step."""
 
@@ -26,9 +30,7 @@ class MctfReader:
     def __init__(self, env: Any) -> None:
         self.env = env
         self.agent_ids: tuple[str, ...] = tuple(env.possible_agents)
-        config = env.config
-        kinds = config.platforms
-        self._platforms = tuple(kinds) if isinstance(kinds, (tuple, list)) else (kinds,) * len(self.agent_ids)
+        self._platforms = platforms_of(env.core)
 
     def facts(self) -> GameFacts:
         """Step and sizes."""
@@ -62,22 +64,20 @@ class MctfReader:
             if core.config.n_obstacles > 0:  # who hits obstacles is in it only; between steps it is of the last
                 driven = driven | core.driven[0]
             controlled = controlled & ~driven
-        # a copy: decisions are read after the step has moved the boats
-        state, driven = core.state[0].copy(), driven_boats(core)
+        rows = driven_boats(core)
         return Fleet(
-            state,
+            core.state[0].copy(),  # decisions are read after the step has moved the boats
             core.team,
             self._platforms,
             controlled,
             self.agent_ids,
-            driven=None if driven is None else driven[0],
+            driven=None if rows is None else rows[0],
             visiting=~core.on_side[0],
         )
 
     def commands(self, actions: Mapping[str, Any]) -> Array:
         """Commands of actions of any kind the env understands."""
-        decoded: Array = self.env.decode(actions)
-        return decoded
+        return np.asarray(self.env.decode(actions))
 
     def playable(self, actions: Mapping[str, Any]) -> dict[str, Any]:
         """The actions: the env takes all that there are."""
@@ -94,22 +94,24 @@ def surroundings_of(core: Any, team: int, keep_out: bool = True) -> Surroundings
     It counts while the flag is away as well: the game throws out who is inside when the flag comes home, at any time.
     A game with ``flag_keepout_m`` 0 throws nobody out, and has no circle.
     """
-    kept = keep_out and core.config.flag_keepout_m > 0.0
-    return _surroundings(core.config, core.field.size, tuple(core.flag_home[team]), kept)
+    config, obstacles = core.config, core.config.obstacles or {}
+    circles = tuple((float(x), float(y), float(r)) for r, (x, y) in obstacles.get("circle") or ())
+    polygons = tuple(tuple((float(x), float(y)) for x, y in corners) for corners in obstacles.get("polygon") or ())
+    keepout_m = config.flag_keepout_m if keep_out else 0.0
+    return surroundings(core.field.size, circles, polygons, core.flag_home[team], keepout_m, config.agent_radius_m)
+
+
+def surroundings(
+    size: Any, circles: tuple[Any, ...], polygons: tuple[Any, ...], flag: Any, keepout_m: float, radius_m: Any
+) -> Surroundings:
+    """Field edge of a size (2,), m, obstacles, and round the flag the circle that boats are kept out of, 0: none."""
+    circle: tuple[Any, ...] = ()
+    if keepout_m > 0.0:
+        reach_m = float(keepout_m) + float(np.max(radius_m)) + KEEP_OUT_MARGIN_M
+        circle = ((float(flag[0]), float(flag[1]), reach_m),)
+    return _surroundings((0.0, 0.0, float(size[0]), float(size[1])), circles, polygons, circle)
 
 
 @lru_cache(maxsize=64)
-def _surroundings_cached(
-    size: tuple[float, float], circles: tuple[Any, ...], polygons: tuple[Any, ...], keep_out: tuple[Any, ...]
-) -> Surroundings:
-    return Surroundings((0.0, 0.0, size[0], size[1]), circles, polygons, stops=keep_out)
-
-
-def _surroundings(config: Any, size: Any, flag: tuple[float, float], keep_out: bool) -> Surroundings:
-    circles, polygons = obstacles_of(config.obstacles)
-    radius = config.agent_radius_m
-    widest = max(radius) if isinstance(radius, (tuple, list)) else radius
-    circle = ((float(flag[0]), float(flag[1]), float(config.flag_keepout_m + widest + KEEP_OUT_MARGIN_M)),)
-    return _surroundings_cached(
-        (float(size[0]), float(size[1])), tuple(circles), tuple(polygons), circle if keep_out else ()
-    )
+def _surroundings(edge: Any, circles: tuple[Any, ...], polygons: tuple[Any, ...], stops: Any) -> Surroundings:
+    return Surroundings(edge, circles, polygons, stops=stops)

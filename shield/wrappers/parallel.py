@@ -9,14 +9,16 @@ from pettingzoo.utils.wrappers import BaseParallelWrapper
 
 from ..commands import Commands
 from ..decision import Decisions
+from ..exceptions import ConfigError
 from ..jit import Array
 from ..platforms import get_platform
 from ..shield import Shield
 from .actions import DISCRETE
-from .checks import begin_serving, check_serving, check_unchanged, facts_now, refuse_second, shield_for, words_of
-from .game_facts import GameFacts
-from .readers import reader_of
-from .reading import GameReader, one_game_shield, parallel_game, team_number
+from .checks import SIDES, ShieldedGame, layers_of, one_game_shield, team_number, words_of
+from .readers import GameReader, reader_of
+
+_OWN = ("env", "masks", "decisions", "_game")
+"""Attributes of the wrapper itself."""
 
 
 class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[misc] # pettingzoo has no types
@@ -60,20 +62,31 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         reader: GameReader | None = None,
         masks: bool = False,
     ) -> None:
-        super().__init__(parallel_game(env))
-        self.team = team_number(team)
-        self._reader: GameReader = reader_of(env) if reader is None else reader
-        refuse_second(env, ShieldedParallelEnv, self.team, one_game_shield(shield))
-        self.shield = shield_for(shield, self._reader, self.team)
-        self._facts: GameFacts = facts_now(self._reader)
-        self.shield_autopilot = shield_autopilot
-        self.keep_out = keep_out
+        _check_parallel(env)
+        super().__init__(env)
+        number, found = team_number(team), reader_of(env) if reader is None else reader
+        _check_not_shielded(env, number, one_game_shield(shield))
+        self._game = ShieldedGame(shield, found, number, shield_autopilot, keep_out)
         self.masks = masks
         self.decisions: Decisions | None = None
-        self._holder: object = None
+
+    @property
+    def shield(self) -> Any:
+        """The shield at work."""
+        return self._game.shield
+
+    @property
+    def team(self) -> int:
+        """The team it decides for, 0 or 1."""
+        return self._game.team
+
+    @property
+    def reader(self) -> GameReader:
+        """What reads the game."""
+        return self._game.reader
 
     def __repr__(self) -> str:
-        return f"<ShieldedParallelEnv of {('blue', 'red')[self.team]} in {self.env!r}: {words_of(self.shield)}>"
+        return f"<ShieldedParallelEnv of {SIDES[self.team]} in {self.env!r}: {words_of(self.shield)}>"
 
     def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Any]:
         """Start a game with a shield that remembers nothing.
@@ -81,9 +94,7 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         Raises:
             ConfigError: the env was set since to what the shield is not for.
         """
-        self.shield = shield_for(self.shield, self._reader, self.team)
-        self._facts = facts_now(self._reader)
-        self._holder = begin_serving(self.shield)
+        self._game.begin()
         self.decisions = None
         observations, infos = self.env.reset(seed=seed, options=options)
         self._mask(infos)
@@ -95,12 +106,14 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         Raises:
             ConfigError: the env was set since its reset to what the shield is not for, or it has begun to serve others.
         """
-        check_unchanged(self._facts, self._reader)
-        check_serving(self.shield, self._holder)
-        with self._reader.filtering(self._safe):
+        self._game.check()
+        with self.reader.filtering(self._safe):
             outcome = self.env.step(actions)
-        self._tell(outcome[-1])
-        self._mask(outcome[-1])
+        infos = outcome[-1]
+        if self.decisions is not None:
+            for i, agent in self._covered(self.decisions.fleet.team, infos):
+                infos[agent]["shield"] = self.decisions[i]
+        self._mask(infos)
         return outcome
 
     def __getattr__(self, name: str) -> Any:
@@ -115,34 +128,45 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
 
     def _safe(self, commands: Array) -> Array:
         """The commands (n, 2) to obey, for those wanted."""
-        fleet = self._reader.fleet(self.team, self.shield_autopilot)
-        around = self._reader.surroundings(self.team, self.keep_out)
-        self.decisions = self.shield.decide(fleet, Commands.game_deg(commands), around)
+        self.decisions = self._game.decide(commands)
         return self.decisions.filtered.values
 
-    def _tell(self, infos: dict[str, dict[str, Any]]) -> None:
-        """Leave each covered boat's decision in its info."""
-        if self.decisions is None:
-            return
-        team = self.decisions.fleet.team
-        for i, agent in enumerate(self._reader.agent_ids):
-            if team[i] == self.team and agent in infos:
-                infos[agent]["shield"] = self.decisions[i]
+    def _covered(self, team: Any, infos: Any) -> list[tuple[int, str]]:
+        """Numbers and ids of the shielded team's boats that have infos."""
+        agents = enumerate(self.reader.agent_ids)
+        return [(i, agent) for i, agent in agents if team[i] == self.team and agent in infos]
 
     def _mask(self, infos: dict[str, dict[str, Any]]) -> None:
         """Leave in each covered boat's info which of the discrete actions would pass."""
         if not self.masks:
             return
-        fleet = self._reader.fleet(self.team, self.shield_autopilot)
+        fleet, around = self._game.seen()
         top_mps = np.array([[get_platform(kind).max_speed_mps] for kind in fleet.platforms])
         pairs = DISCRETE[:, None] * np.concatenate([top_mps, np.ones_like(top_mps)], axis=1)
-        around = self._reader.surroundings(self.team, self.keep_out)
         passes = self.shield.safe_actions(fleet, [Commands.game_deg(pair) for pair in pairs], around)
         passes[~passes.any(axis=1)] = True
-        for i, agent in enumerate(self._reader.agent_ids):
-            if fleet.team[i] == self.team and agent in infos:
-                infos[agent]["action_mask"] = passes[i].astype(np.int8)
+        for i, agent in self._covered(fleet.team, infos):
+            infos[agent]["action_mask"] = passes[i].astype(np.int8)
 
 
-_OWN = ("env", "shield", "team", "shield_autopilot", "keep_out", "masks", "decisions", "_reader", "_facts", "_holder")
-"""Attributes of the wrapper itself."""
+def _check_parallel(env: Any) -> None:
+    """Refuse an environment whose boats act in turn (AEC), and a class."""
+    if isinstance(env, type):
+        raise ConfigError(f"{env.__name__} is a class; give an environment: {env.__name__}(...)")
+    if callable(getattr(type(env), "last", None)) and callable(getattr(type(env), "agent_iter", None)):
+        raise ConfigError(
+            f"{type(env).__name__} is an AEC env, in which boats act in turn, and the shield decides for all at once; "
+            "wrap the parallel env: parallel_to_aec(ShieldedParallelEnv(mctf_v0.parallel_env(...), Shield()))"
+        )
+
+
+def _check_not_shielded(env: Any, team: int, shield: Any) -> None:
+    """Refuse a second wrapper of a team, which would mend the first one's commands, and one shield for both teams."""
+    others = [layer for layer in layers_of(env) if isinstance(layer, ShieldedParallelEnv)]
+    if any(layer.shield is shield for layer in others):
+        raise ConfigError("this shield serves the other team of this environment; give each team a Shield of its own")
+    if any(layer.team == team for layer in others):
+        raise ConfigError(
+            f"the {SIDES[team]} team of this environment has a shield already; wrap env.unwrapped, or shield the other "
+            "team"
+        )

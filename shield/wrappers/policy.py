@@ -13,10 +13,8 @@ from ..decision import Decisions
 from ..exceptions import ConfigError, FleetError, PolicyError
 from ..fleet import Fleet
 from ..shield import Shield
-from .checks import begin_serving, check_serving, check_unchanged, facts_now, shield_for, words_of
-from .game_facts import GameFacts
-from .readers import reader_of
-from .reading import GameReader, one_game_shield
+from .checks import Serving, ShieldedGame, one_game_shield, words_of
+from .readers import GameReader, reader_of
 
 logger = logging.getLogger(__name__)
 
@@ -46,12 +44,9 @@ class ShieldedTeamPolicy:
         self.keep_out = keep_out
         self.name = f"shielded {getattr(policy, 'name', type(policy).__name__)}"
         self.decisions: Decisions | None = None
-        self._reader: GameReader | None = None
-        self._shown: tuple[float, Any] | None = None
-        self._team = 0
+        self._game: ShieldedGame | None = None
         self._agent_ids: tuple[str, ...] = ()
-        self._facts: GameFacts | None = None
-        self._holder: object = None
+        self._shown: tuple[float, Any] | None = None
 
     def reset(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:
         """Begin a game.
@@ -61,12 +56,11 @@ class ShieldedTeamPolicy:
                 ours; the shield is for another step; or the boats are none, not in the game, or of two teams.
         """
         reader = reader_of(env)
-        self._team = _team_of(reader, agent_ids)
+        team = _team_of(reader, agent_ids)
         reader.check_answers(agent_ids)
-        self.shield = shield_for(self.shield, reader, self._team, held=True)
-        self._reader, self._agent_ids, self._facts = reader, tuple(agent_ids), facts_now(reader)
-        self._shown = None
-        self._holder = begin_serving(self.shield)
+        self._game = ShieldedGame(self.shield, reader, team, False, self.keep_out, held=True)
+        self.shield, self._agent_ids, self._shown = self._game.shield, tuple(agent_ids), None
+        self._game.begin()
         self.policy.reset(env, agent_ids, seed)
 
     def act(self, observations: Mapping[str, Any], infos: Mapping[str, Any]) -> dict[str, Any]:
@@ -79,42 +73,35 @@ class ShieldedTeamPolicy:
                 What the policy itself raises comes out as it is: nothing is sent, and whoever plays decides what then.
             ConfigError: the env was set since then to what the shield is not for, or it has begun to serve others.
         """
-        if self._reader is None or self._facts is None:
+        if self._game is None:
             raise PolicyError("call reset(env, agent_ids, seed) before act()")
-        check_unchanged(self._facts, self._reader)
-        check_serving(self.shield, self._holder)
-        self._check_game(self._reader, observations)
+        reader = self._game.reader
+        self._game.check()
+        self._check_played(reader.moment(), observations)
         answer = self.policy.act(observations, infos)
         if not isinstance(answer, Mapping):
             raise PolicyError(
                 f"the policy answered {type(answer).__name__}; let act return a mapping of boat to action"
             )
-        self._reader.check_answers(self._agent_ids)
+        reader.check_answers(self._agent_ids)
         actions = dict(answer)
-        fleet = self._reader.fleet(self._team, False)
-        around = self._reader.surroundings(self._team, self.keep_out)
-        wanted = Commands.game_deg(self._reader.commands(actions))
-        self.decisions = self.shield.decide(fleet, wanted, around)
-        actions = self._reader.playable(actions)
+        self.decisions = self._game.decide(reader.commands(actions))
+        actions = reader.playable(actions)
         for agent in self._agent_ids:
-            i = self._reader.agent_ids.index(agent)
+            i = reader.agent_ids.index(agent)
             sent = self.decisions.filtered.values[i]
-            if self.decisions.intervened[i] or (self._reader.takes_pairs_only and np.isfinite(sent).all()):
+            if self.decisions.intervened[i] or (reader.takes_pairs_only and np.isfinite(sent).all()):
                 actions[agent] = sent.copy()
         return actions
 
     def __repr__(self) -> str:
         return f"<{self.name}: {words_of(self.shield)}>"
 
-    def _check_game(self, reader: GameReader, observations: Mapping[str, Any]) -> None:
+    def _check_played(self, moment: float, observations: Mapping[str, Any]) -> None:
         """Check that the game whose positions are read is the one that is played: it moves on when what is shown does.
 
         A copy of a wrapped policy takes a copy of its game along, which nobody plays.
-
-        Raises:
-            PolicyError: it stands still.
         """
-        moment = reader.moment()
         seen = observations.get(self._agent_ids[0]) if isinstance(observations, Mapping) else None
         shown = np.array(seen, dtype=object, copy=True)
         before, self._shown = self._shown, (moment, shown)
@@ -132,11 +119,7 @@ class ShieldedTeamPolicy:
 
 
 def _team_of(reader: GameReader, agent_ids: Sequence[str]) -> int:
-    """The team of the boats.
-
-    Raises:
-        ConfigError: there are none, one is not in the game, or they are of two teams.
-    """
+    """The team of the boats, which must be of one."""
     for agent in agent_ids:
         if agent not in reader.agent_ids:
             raise ConfigError(f"unknown boat {agent!r}; the game has {', '.join(reader.agent_ids)}")
@@ -167,7 +150,7 @@ class ShieldedCallable:
         self.shield: Shield = one_game_shield(shield)
         self.read = read
         self.decisions: Decisions | None = None
-        self._holder = object()
+        self._serving = Serving(shield)
         self._relative = True
         self._failure = ""
 
@@ -183,12 +166,17 @@ class ShieldedCallable:
             FleetError: ``read`` gave no fleet.
         """
         fleet = self.read(seen)
-        check_serving(self.shield, self._holder)
+        self._serving.check()
         if not isinstance(fleet, Fleet):
             raise FleetError(f"read answered {type(fleet).__name__}; let it return a Fleet, see Fleet.of")
         try:
-            wanted = _usable(self.policy(seen), len(fleet))
-            self._note(_not_finite(wanted, fleet))
+            wanted = self.policy(seen)
+            if not isinstance(wanted, Commands) or len(wanted) != len(fleet):
+                found = f"Commands of {len(wanted)}" if isinstance(wanted, Commands) else type(wanted).__name__
+                raise PolicyError(f"it answered {found}; give Commands of all {len(fleet)} boats")
+            rows = np.flatnonzero(fleet.controlled & ~np.isfinite(wanted.values).all(axis=1))
+            named = ", ".join(repr(fleet.names[i]) for i in rows)
+            self._note(f"commands of {named} are not finite; they hold" if named else "")
             self._relative = wanted.relative
         except Exception as error:  # whatever a policy does, its boats must get commands
             self._note(f"{type(error).__name__}: {error}; all boats hold")
@@ -207,25 +195,6 @@ class ShieldedCallable:
         if self._failure and not failure:
             logger.warning("policy answers again")
         self._failure = failure
-
-
-def _usable(answer: Any, boats: int) -> Commands:
-    """The answer, if it is commands for so many boats.
-
-    Raises:
-        PolicyError: it is not.
-    """
-    if not isinstance(answer, Commands) or len(answer) != boats:
-        found = f"Commands of {len(answer)}" if isinstance(answer, Commands) else type(answer).__name__
-        raise PolicyError(f"it answered {found}; give Commands of all {boats} boats")
-    return answer
-
-
-def _not_finite(wanted: Commands, fleet: Fleet) -> str:
-    """Which boats to decide for have commands that are not finite, in words; empty: none."""
-    rows = np.flatnonzero(fleet.controlled & ~np.isfinite(wanted.values).all(axis=1))
-    named = ", ".join(repr(fleet.names[i]) for i in rows)
-    return f"commands of {named} are not finite; they hold" if named else ""
 
 
 def wrap_policy(policy: Any, shield: Shield, read: Callable[[Any], Fleet] | None = None) -> Any:

@@ -1,7 +1,8 @@
-"""Reading a real Pyquaticus environment object."""
+"""Reading a real Pyquaticus environment object; settings that a shield would misread are refused by name."""
 
 from __future__ import annotations
 
+import difflib
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -10,22 +11,55 @@ from typing import Any
 
 import numpy as np
 
+from ..exceptions import ConfigError
 from ..fleet import Fleet
 from ..jit import Array, IntArray
+from ..platforms import Platform, get_platform
 from ..platforms import layout as L
 from ..surroundings import Surroundings
 from .actions import DISCRETE, Command, Seat, check_agents, plain_action, read_action
+from .driving import Driven, Drives, driven_rows
 from .game_facts import GameFacts
-from .pyquaticus_checks import check_env, check_pairs, moves_of, platforms_of_players, step_of
-from .pyquaticus_driving import driven_players
-from .reading import KEEP_OUT_MARGIN_M
+from .mctf import surroundings
+from .readers import game_reader
+
+NEEDED = ("agent_radius", "dynamics", "env_size", "flag_keepout_radius", "flags", "players", "_move_agents")
+"""Attributes of the environment without which it cannot be read, or its boats' commands not be reached."""
+
+_NAMES = """
+gps_env env_bounds env_bounds_unit blue_flag_home red_flag_home flag_homes_unit scrimmage_coords scrimmage_coords_unit
+topo_contour_eps agent_radius flag_radius flag_keepout catch_radius untag_radius slip_radius n_circle_segments obstacles
+oob_speed_frac tag_speed_frac dynamics tau sim_speedup_factor default_init on_sides_init max_score max_time
+tagging_cooldown tag_on_collision tag_on_oob tag_probability power_play_percentage normalize_obs short_obs_hist_length
+short_obs_hist_interval long_obs_hist_length long_obs_hist_interval lidar_obs lidar_range num_lidar_rays normalize_state
+short_state_hist_length short_state_hist_interval long_state_hist_length long_state_hist_interval render_fps screen_frac
+arena_buffer_frac render_agent_ids render_field_points render_traj_mode render_traj_freq render_traj_cutoff
+render_lidar_mode render_saving render_transparency_alpha suppress_numpy_warnings
+"""
+
+KNOWN_SETTINGS = frozenset(_NAMES.split())
+"""Settings whose effect on boats is read from the environment, or is none; of others nobody knows what they do."""
+
+_OF_PLAYERS = {
+    "max_speed": "max_speed_mps",
+    "speed_factor": "speed_factor",
+    "max_thrust": "max_thrust",
+    "max_rudder": "max_rudder",
+    "turn_loss": "turn_loss",
+    "turn_rate": "turn_gain",
+    "max_acc": "max_acc",
+    "max_dec": "max_dec",
+    "rotate_speed": "rotate_speed_dps",
+}
+"""Pyquaticus' name of a boat's property -> ours, for boats with thrust and rudder."""
 
 
+@game_reader(lambda env: hasattr(env, "players") and hasattr(env, "flag_homes") and not hasattr(env, "core"))
 class PyquaticusReader:
     """Reads a ``PyQuaticusEnv``: true positions and autopilot memory of every player.
 
     The environment drives tagged and out-of-bounds boats itself, after the policy's action, and stops disabled ones:
-    those are not ours to decide for, and are foreseen as what they are (`pyquaticus_driving`).
+    those are not ours to decide for, and are predicted as what they are.
 
     Raises:
         ConfigError: the environment has settings that a shield would misread.
@@ -79,12 +113,19 @@ class PyquaticusReader:
             yield
 
     def check_answers(self, agent_ids: Sequence[str]) -> None:
-        """Check that the environment plays pairs.
+        """Check that the environment plays pairs: if a boat's first action was of its declared space, all must be.
 
         Raises:
-            ConfigError: it does not.
+            ConfigError: a boat is bound to other actions.
         """
-        check_pairs(self.env, agent_ids)
+        checked, match = (getattr(self.env, f"act_space_{name}", {}) for name in ("checked", "match"))
+        for agent in agent_ids:
+            kind = getattr(self.env, "act_space_str", {}).get(agent, "continuous")
+            if checked.get(agent) and match.get(agent) and kind != "continuous":
+                raise ConfigError(
+                    f"{agent} has played {kind} actions in this environment, which now takes no others from it; "
+                    "build it with action_space='continuous', or shield the environment: ShieldedParallelEnv"
+                )
 
     def moment(self) -> float:
         """Time of the game, s."""
@@ -95,20 +136,20 @@ class PyquaticusReader:
         players = list(self.env.players.values())
         state = np.array([_row(player) for player in players])
         teams = self._teams()
-        driven = np.array([_driven(player) for player in players])
-        ours = (teams == team) & ~driven
+        driven = _driven(players)
         return Fleet(
             state,
             teams,
             self._platforms,
-            ours,
+            (teams == team) & ~(driven[0] | driven[1] | driven[2]),
             self.agent_ids,
             driven=driven_players(self.env, players, state, teams),
             visiting=np.array([not getattr(player, "on_own_side", True) for player in players], np.bool_),
         )
 
     def _teams(self) -> IntArray:
-        return np.array([_team(player) for player in self.env.players.values()], dtype=np.int64)
+        teams = (player.team for player in self.env.players.values())
+        return np.array([int(getattr(team, "value", team)) for team in teams], dtype=np.int64)
 
     def commands(self, actions: Mapping[str, Any]) -> Array:
         """Commands of actions of any kind; boats without one stop, as in the env."""
@@ -124,12 +165,10 @@ class PyquaticusReader:
 
         It looks whole numbers up in a list, so that arrays without axes, tensors and whole floats are none to it.
         """
-        return {agent: self._playable(agent, action) for agent, action in actions.items()}
-
-    def _playable(self, agent: str, action: Any) -> Any:
-        if type(action) in (int, str) or _is_pair(action):
-            return action
-        return plain_action(self._seat(agent), action)
+        return {
+            agent: action if _is_playable(action) else plain_action(self._seat(agent), action)
+            for agent, action in actions.items()
+        }
 
     def _seat(self, agent: str) -> Seat:
         """The env looks numbers up in a list, by Python's rules, and takes the first two entries of anything longer."""
@@ -138,28 +177,21 @@ class PyquaticusReader:
         return Seat(
             agent,
             float(player.get_max_speed()),
-            lambda name: self._to_point(name, player),
+            lambda name: _to_point(self.env, name, player),
             points,
             lowest=-len(DISCRETE),
             bools=True,
             longer=True,
         )
 
-    def _to_point(self, name: str, player: Any) -> Command:
-        speed, heading = self.env._afp_to_speed_relheading(name, player)
-        return float(speed), float(heading)
-
     def surroundings(self, team: int, keep_out: bool) -> Surroundings:
         """Field edge and obstacles; the own flag's circle, see `mctf.surroundings_of`."""
-        env = self.env
-        circles, polygons = _obstacles(getattr(env, "obstacles", ()))
-        size = np.asarray(env.env_size, dtype=np.float64)
-        flag, keepout_m = env.flags[team], float(env.flag_keepout_radius)
-        circle: tuple[tuple[float, float, float], ...] = ()
-        if keep_out and keepout_m > 0.0:
-            radius = keepout_m + float(np.max(env.agent_radius)) + KEEP_OUT_MARGIN_M
-            circle = ((float(flag.home[0]), float(flag.home[1]), radius),)
-        return Surroundings((0.0, 0.0, float(size[0]), float(size[1])), circles, polygons, stops=circle)
+        env, shapes = self.env, getattr(self.env, "obstacles", ())
+        circles = tuple((*map(float, one.center_point), float(one.radius)) for one in shapes if hasattr(one, "radius"))
+        corners = (one.anchor_points for one in shapes if hasattr(one, "anchor_points"))
+        polygons = tuple(tuple((float(x), float(y)) for x, y in points) for points in corners)
+        keepout_m = float(env.flag_keepout_radius) if keep_out else 0.0
+        return surroundings(env.env_size, circles, polygons, env.flags[team].home, keepout_m, env.agent_radius)
 
 
 @contextmanager
@@ -176,28 +208,17 @@ def _standing_in(thing: Any, name: str, value: Any) -> Iterator[None]:
             setattr(thing, name, before)
 
 
-def _obstacles(obstacles: Sequence[Any]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
-    """Circles (x, y, radius) and polygons of corners, of Pyquaticus' objects."""
-    circles = [(*map(float, one.center_point), float(one.radius)) for one in obstacles if hasattr(one, "radius")]
-    corners = [one.anchor_points for one in obstacles if hasattr(one, "anchor_points")]
-    polygons = [tuple((float(x), float(y)) for x, y in points) for points in corners]
-    return tuple(circles), tuple(polygons)
+def _to_point(env: Any, name: str, player: Any) -> Command:
+    speed, heading = env._afp_to_speed_relheading(name, player)
+    return float(speed), float(heading)
 
 
-def _driven(player: Any) -> bool:
-    """Whether the environment decides for this boat."""
-    return bool(player.is_tagged or player.oob or getattr(player, "is_disabled", False))
-
-
-def _is_pair(action: Any) -> bool:
-    """Whether it is a pair of plain numbers."""
+def _is_playable(action: Any) -> bool:
+    """Whether it is a plain number, a name or a pair of plain numbers."""
     if isinstance(action, np.ndarray):
         return action.shape == (2,)
-    return isinstance(action, (list, tuple)) and len(action) == 2 and all(isinstance(one, Real) for one in action)
-
-
-def _team(player: Any) -> int:
-    return int(getattr(player.team, "value", player.team))
+    pair = isinstance(action, (list, tuple)) and len(action) == 2 and all(isinstance(one, Real) for one in action)
+    return pair or type(action) in (int, str)
 
 
 def _row(player: Any) -> Array:
@@ -219,3 +240,127 @@ def _controller(player: Any, name: str) -> tuple[float, float]:
     error = getattr(controller, "_prev_error", None)
     integral = float(getattr(controller, "_integral", 0.0))
     return (math.nan if error is None else float(error)), integral
+
+
+def _driven(players: Sequence[Any]) -> tuple[Array, Array, Array]:
+    """Which boats the environment drives: tagged, out of bounds, disabled, each (n,) bool."""
+    tagged, oob, disabled = (
+        np.array([bool(getattr(player, name, False)) for player in players])
+        for name in ("is_tagged", "oob", "is_disabled")
+    )
+    return tagged, oob, disabled
+
+
+def driven_players(env: Any, players: Sequence[Any], state: Array, team: IntArray) -> Array | None:
+    """Rows of `Fleet.driven` of all players; None where the environment drives none.
+
+    Home is the own flag's, or where there are corners the nearer of their marks. It leads tagged boats past obstacles
+    by a random planner, and of versions without the radius nobody knows when they are home.
+    """
+    driven = _driven(players)
+    if not np.any(driven):
+        return None
+    homes = [np.array([flag.home], dtype=np.float64) for flag in env.flags]
+    marks = [getattr(env, name, None) for name in ("blue_untag_coords", "red_untag_coords")]
+    corners = any(one is not None for one in marks)
+    ends = ((env.env_ul, env.env_ll), (env.env_ur, env.env_lr)) if corners else homes
+    near_m = float(env.untag_radius if corners else getattr(env, "catch_radius", math.nan))
+    top_mps = np.array([float(player.get_max_speed()) for player in players])
+    drives = Drives(
+        [np.asarray(one, dtype=np.float64) for one in (marks if corners else homes)],
+        [np.asarray(one, dtype=np.float64) for one in ends],
+        math.nan if getattr(env, "obstacles", ()) else near_m,
+        np.asarray(env.env_size, dtype=np.float64),
+        top_mps * float(getattr(env, "tag_speed_frac", 1.0)),
+        top_mps * float(getattr(env, "oob_speed_frac", 1.0)),
+    )
+    disabled_for_s = np.array([_disabled_for_s(env, int(number)) for number in team])
+    return driven_rows(drives, Driven(*driven, disabled_for_s), state, team)
+
+
+def _disabled_for_s(env: Any, team: int) -> float:
+    """Time until the power play that stops a team's boats ends, s; 0, which is to say nothing, where it is not told."""
+    start = getattr(env, ("blue_power_start", "red_power_start")[team], None)
+    length = getattr(env, "power_play_length", None)
+    if start is None or length is None:
+        return 0.0
+    ends_s = (float(start) + float(length)) * float(env.sim_speedup_factor) * float(env.dt)
+    return math.inf if ends_s < float(env.current_time) else ends_s - float(env.current_time)
+
+
+def check_env(env: Any) -> None:
+    """Refuse an environment that a shield would misread; the message names the setting and the remedy."""
+    missing = [name for name in NEEDED if not hasattr(env, name)]
+    if missing:
+        raise ConfigError(
+            f"{type(env).__name__} has no {', '.join(missing)}; give a PyQuaticusEnv, or use Shield.decide with a "
+            "Fleet of your own"
+        )
+    if getattr(env, "gps_env", False):
+        raise ConfigError(
+            "gps_env = True is not supported: its positions are web-Mercator units, not metres; use gps_env=False"
+        )
+    moves_of(env)
+    settings = getattr(env, "config_dict", None)
+    for name in settings if isinstance(settings, Mapping) else ():
+        if name not in KNOWN_SETTINGS:
+            near = difflib.get_close_matches(str(name), KNOWN_SETTINGS, n=2)
+            hint = f"did you mean {', '.join(near)}?" if near else "remove it"
+            raise ConfigError(f"Pyquaticus setting {name!r} is not known here, so neither is what it does; {hint}")
+
+
+def moves_of(env: Any) -> int:
+    """Moves that the environment makes of one action: those of its speed-up, and with a window open of its frames."""
+    speedup = getattr(env, "sim_speedup_factor", 1)
+    if isinstance(speedup, bool) or not isinstance(speedup, (int, np.integer)) or speedup < 1:
+        raise ConfigError(f"sim_speedup_factor = {speedup!r} is not supported; give a whole number of steps, 1 or more")
+    frames = getattr(env, "num_renders_per_step", 1) if getattr(env, "render_mode", None) else 1
+    return int(speedup) * int(frames)
+
+
+def step_of(env: Any) -> float:
+    """Time that one command moves the boats by, s: with a window open a frame, else a step."""
+    whole = getattr(env, "dt", getattr(env, "tau", None))
+    steps = {float(step) for step in (getattr(player, "dt", whole) for player in env.players.values()) if step}
+    if len(steps) != 1:
+        raise ConfigError(
+            f"the boats of this {type(env).__name__} move by {sorted(steps) or 'unknown'} s a step; give one with one "
+            "step for all"
+        )
+    return steps.pop()
+
+
+def platforms_of_players(env: Any) -> tuple[str, ...]:
+    """Names of the boats' platforms, which must be as they are here."""
+    kinds = [get_platform(name) for name in env.dynamics]
+    if len(kinds) != len(env.players):
+        raise ConfigError(f"dynamics names {len(kinds)} boats of {len(env.players)}; give one for each")
+    for player, kind in zip(env.players.values(), kinds, strict=True):
+        if kind.kind == "usv":
+            _check_player(player, kind)
+        elif float(player.get_max_speed()) != kind.max_speed_mps:
+            raise _other(player, kind, "max_speed", player.get_max_speed(), kind.max_speed_mps)
+    return tuple(kind.name for kind in kinds)
+
+
+def _check_player(player: Any, kind: Platform) -> None:
+    for theirs, ours in _OF_PLAYERS.items():
+        found, known = getattr(player, theirs, None), getattr(kind, ours)
+        if found is not None and found != known:
+            raise _other(player, kind, theirs, found, known)
+    points = getattr(player, "thrust_map", None)
+    if points is not None and not np.array_equal(np.transpose(points), np.array(kind.thrust_map)):
+        raise _other(player, kind, "thrust_map", np.asarray(points).tolist(), kind.thrust_map)
+    controllers = getattr(player, "_pid_controllers", {})
+    for name, gains in (("speed", kind.speed_pid), ("heading", kind.heading_pid)):
+        for gain in ("kp", "ki", "kd"):
+            found, known = getattr(controllers.get(name), f"_{gain}", None), getattr(gains, gain)
+            if found is not None and found != known:
+                raise _other(player, kind, f"{gain} of its {name} controller", found, known)
+
+
+def _other(player: Any, kind: Platform, name: str, found: Any, known: Any) -> ConfigError:
+    return ConfigError(
+        f"{player.id} is a {kind.name} with {name} = {found}, where the shield predicts one with {known}; leave the "
+        "boat as Pyquaticus makes it, or use Shield.decide with a Platform of your own"
+    )

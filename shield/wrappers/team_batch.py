@@ -15,8 +15,8 @@ from ..exceptions import ConfigError, GameError, PolicyError
 from ..jit import Array, BoolArray
 from ..platforms import layout as L
 from .actions import DISCRETE, Seat, read_flat
+from .checks import team_number
 from .games_shield import check_games
-from .reading import team_number
 from .tallies import Tallies, changed_by
 
 ACTIONS = ("discrete", "continuous", "normalised")
@@ -25,25 +25,16 @@ MOST_INTERVAL = 1000
 
 
 class Stepped(NamedTuple):
-    """Outcome of a step for the L = games * boats learners.
+    """Outcome of a step for the L = games * boats learners."""
 
-    Attributes:
-        observations: (L, n_obs) float32, of the new game where one ended.
-        rewards: (L,).
-        terminated: (L,) the game was won.
-        truncated: (L,) its time was over.
-        final_observations: (L, n_obs) before a new game began; only rows of ended games matter.
-        events: what happened in the decision, by name of `tallies.EVENTS`, each (L,).
-        episodes: totals of the games under way, ended ones included, each (L,): ``r`` reward, ``l`` decisions,
-            ``t`` s since the batch was made, and the same names.
-    """
-
-    observations: NDArray[np.float32]
-    rewards: Array
-    terminated: BoolArray
-    truncated: BoolArray
-    final_observations: NDArray[np.float32]
-    events: Mapping[str, Array] = {}
+    observations: NDArray[np.float32]  # (L, n_obs) float32, of the new game where one ended
+    rewards: Array  # (L,)
+    terminated: BoolArray  # (L,) the game was won
+    truncated: BoolArray  # (L,) its time was over
+    final_observations: NDArray[np.float32]  # (L, n_obs) before a new game began; only rows of ended games matter
+    events: Mapping[str, Array] = {}  # what happened in the decision, by name of `tallies.EVENTS`, each (L,)
+    # totals of the games under way, ended ones included, each (L,): ``r`` reward, ``l`` decisions, ``t`` s since the
+    # batch was made, and the same names
     episodes: Mapping[str, Array] = {}
 
 
@@ -93,8 +84,12 @@ class TeamBatch:
         self.boats = np.flatnonzero(core.team == self.team)
         self.others = np.flatnonzero(core.team != self.team)
         self.learners = core.n_games * len(self.boats)
-        self._filter = None if shield is None else _filter_of(shield, core, self.team)
-        self._games_filter = self._filter
+        if shield is not None and not isinstance(shield, BatchedShield):
+            raise ConfigError(f"{type(shield).__name__} is no shield of a batch of games; give games_shield(core)")
+        if shield is not None:
+            check_games(shield, core)
+        self._filter: Any = None if shield is None else shield.filter_for(self.team)
+        self._games_filter = self._filter  # of the games themselves: what learns may put another in its place
         self._commands = np.zeros((core.n_games, core.n_boats, 2))
         self._seed = seed
         self._begun = False
@@ -159,7 +154,8 @@ class TeamBatch:
             ended = (self.core.terminated | self.core.truncated) & going
             terminated |= self.core.terminated & going
             truncated |= self.core.truncated & going
-            final = self._noted(final, observations, going)
+            now = self._flat(observations)
+            final = now if final is None else np.where(self._spread(going)[:, None], now, final)
             going = going & ~ended
             if not going.any():
                 break
@@ -206,16 +202,6 @@ class TeamBatch:
         if self.reward is not None:
             return observations, self.reward.reward(self, changed)
         return observations, rewards[:, self.boats]
-
-    def _noted(self, final: Any, observations: Any, going: BoolArray) -> NDArray[np.float32]:
-        """Last observations (L, n_obs) of the games: of those that have ended, what was seen then."""
-        now = self._flat(observations)
-        if final is None:
-            return now
-        still = self._spread(going)
-        final[still] = now[still]
-        seen: NDArray[np.float32] = final
-        return seen
 
     def _heading_deg(self) -> Array:
         """(B, n) headings of the learners' boats, deg."""
@@ -285,15 +271,3 @@ def _in_units(actions: Any, top_mps: Array) -> Any:
         return given
     clipped = np.clip(given, -1.0, 1.0)
     return np.stack([0.5 * (clipped[:, 0] + 1.0) * top_mps, 180.0 * clipped[:, 1]], axis=1)
-
-
-def _filter_of(shield: Any, core: Any, team: int) -> Any:
-    """The command filter of a shield of these games.
-
-    Raises:
-        ConfigError: it is no shield of a batch, or one of other games.
-    """
-    if not isinstance(shield, BatchedShield):
-        raise ConfigError(f"{type(shield).__name__} is no shield of a batch of games; give games_shield(core)")
-    check_games(shield, core)
-    return shield.filter_for(team)

@@ -26,11 +26,7 @@ def spaces_of(batch: TeamBatch) -> tuple[Space[Any], Space[Any]]:
 
 
 def mask_of(options: Mapping[str, Any] | None) -> Any:
-    """The ``reset_mask`` among reset's options, or None.
-
-    Raises:
-        ConfigError: there are others.
-    """
+    """The ``reset_mask`` among reset's options, or None; a `ConfigError` where there are others."""
     for name in options or {}:
         if name != "reset_mask":
             raise ConfigError(

@@ -57,7 +57,7 @@ def test_a_misspelt_setting_is_explained(name, hint):
         ({"team_size": 0}, "team_size is 0; give a whole number >= 1"),
         ({"team_size": 2.0}, "team_size is 2.0"),
         ({"team_size": True}, "team_size is True"),
-        ({"team_size": 10**21}, "team_size is 1000000000000000000000; give at most 1000 boats"),
+        ({"team_size": 10**21}, "team_size is 1000000000000000000000; give at most 1000"),
         ({"dt_s": 0.0}, "dt_s is 0.0; it must be > 0"),
         ({"dt_s": float("nan")}, "dt_s is nan; give a finite number"),
         ({"max_time_s": float("inf")}, "max_time_s is inf"),

@@ -17,12 +17,12 @@ from steerclear.env.record import (
     find_breaches,
     load,
     make_record,
+    meta_of,
     read_meta,
     save,
     validate,
 )
 from steerclear.env.record_file import LATER
-from steerclear.env.record_meta import meta_of
 from steerclear.shield.exceptions import TraceError
 
 

@@ -9,8 +9,7 @@ import pytest
 from PIL import Image
 from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
-from steerclear.env.record import read_meta
-from steerclear.env.record_meta import meta_of
+from steerclear.env.record import meta_of, read_meta
 from steerclear.env.render import THEMES, Arena, Overlay, Picture, Renderer, Scene, save_animation, save_frame
 from steerclear.env.render.renderer import MODES, pixels
 from steerclear.shield.exceptions import ConfigError, TraceError

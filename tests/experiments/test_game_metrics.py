@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from steerclear.env.config import GameConfig
-from steerclear.env.record import find_breaches, make_record
-from steerclear.env.record_meta import meta_of
+from steerclear.env.record import find_breaches, make_record, meta_of
 from steerclear.experiments.game_metrics import (
     PairDistances,
     check_penalty,

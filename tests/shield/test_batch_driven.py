@@ -15,7 +15,7 @@ from steerclear.shield.platforms import layout as L
 from steerclear.shield.wrappers import games_shield
 from steerclear.shield.wrappers.driving import driven_boats
 from steerclear.shield.wrappers.mctf import surroundings_of
-from steerclear.shield.wrappers.pyquaticus_driving import driven_players
+from steerclear.shield.wrappers.pyquaticus import driven_players
 
 GAMES = 3
 

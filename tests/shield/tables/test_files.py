@@ -9,10 +9,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from steerclear.shield.exceptions import TableError
 from steerclear.shield.platforms.registry import get_platform
-from steerclear.shield.tables.card import Card
 from steerclear.shield.tables.files import (
     CACHE_VARIABLE,
     SHIPPED,
+    Card,
     cache_folder,
     find_table,
     load_table,

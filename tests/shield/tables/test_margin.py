@@ -8,9 +8,8 @@ from steerclear.shield.exceptions import TableError
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.registry import get_platform
 from steerclear.shield.tables.areas import area_m2, reach_ahead_m
-from steerclear.shield.tables.card import Card
 from steerclear.shield.tables.duel import PURE, best_rudders, duel
-from steerclear.shield.tables.files import SHIPPED, pack_values, read_table, stack_tables
+from steerclear.shield.tables.files import SHIPPED, Card, pack_values, read_table, stack_tables
 from steerclear.shield.tables.make import coarser, convergence, make_table
 from steerclear.shield.tables.margin import full_thrust_state, model_error, value_loss
 from steerclear.shield.tables.solve import start

@@ -71,7 +71,7 @@ def test_settings_changed_after_wrapping_are_refused_at_the_next_reset(settings,
 @pytest.mark.parametrize(
     ("changed", "words"),
     [
-        ({"max_speed": 5.0}, "agent_1 is a heron with max_speed = 5.0, where the shield foresees one with 2.0; leave"),
+        ({"max_speed": 5.0}, "agent_1 is a heron with max_speed = 5.0, where the shield predicts one with 2.0; leave"),
         ({"turn_rate": 70}, "agent_1 is a heron with turn_rate = 70"),
         ({"thrust_map": np.array([[0, 100], [0, 5]])}, "agent_1 is a heron with thrust_map ="),
         ({"_pid_controllers": {"heading": SimpleNamespace(_kp=0.35)}}, "kp of its heading controller = 0.35"),
@@ -136,7 +136,7 @@ def test_obstacles_are_those_the_environment_has():
     reader = PyquaticusReader(game(obstacles=[circle, wall]))
     around = reader.surroundings(0, keep_out=True)
     assert (around.circles, around.polygons) == (((40.0, 20.0, 3.0),), (((1.0, 2.0), (3.0, 4.0), (5.0, 0.0)),))
-    assert reader.facts().obstacle_clearance_m() == 2.0
+    assert reader.facts().distances()["obstacle_clearance_m"] == 2.0
 
 
 def test_the_own_flags_circle_is_there_where_the_game_has_one():

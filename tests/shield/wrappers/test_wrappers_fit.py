@@ -20,7 +20,7 @@ ISLAND = {"circle": [(2.0, (40.0, 10.0))]}
 
 @pytest.fixture
 def told(caplog):
-    game_facts._log_once.cache_clear()
+    game_facts._warn_once.cache_clear()
     caplog.set_level(logging.WARNING, logger=game_facts.__name__)
     return caplog
 
@@ -111,7 +111,7 @@ def test_a_shield_for_a_game_has_its_step_and_distances(build, told):
     found = shield.config
     assert (found.dt_s, found.separation_m, found.obstacle_clearance_m, found.current_mps) == (0.2, 4.0, 2.0, 0.1)
     told.clear()
-    game_facts._log_once.cache_clear()
+    game_facts._warn_once.cache_clear()
     assert wrap_env(MctfEnv(config), shield) is shield
     assert told.text == ""
     assert Shield.for_game(build(config), separation_m=5.0).config.separation_m == 5.0
@@ -129,7 +129,7 @@ def test_shields_of_batches_take_the_games_distances_and_tell_of_smaller_ones(to
     assert games_shield(core, ShieldConfig(separation_m=2.5)).config.separation_m == 2.5
     assert told.text.count("keeps 2.5 m (separation_m), but this game counts collisions at 4 m") == 1
     told.clear()
-    game_facts._log_once.cache_clear()
+    game_facts._warn_once.cache_clear()
     own = BatchedShield(ShieldConfig(), 2, ("surveyor",) * 6, (0, 0, 0, 1, 1, 1))
     TeamBatch(core, shield=own).core.step(np.zeros((2, 6, 2)), own.filter_for(0))
     assert "keeps 2.5 m (separation_m), but this game counts collisions at 4 m" in told.text

@@ -182,6 +182,6 @@ def test_pyquaticus_boats_that_the_game_drives_are_not_decided_for():
 
 def test_rows_of_pyquaticus_players_hold_what_is_known():
     game = Quaticus(gap_m=30.0)
-    row = ShieldedParallelEnv(game, Shield())._reader.fleet(0, True).state[0]
+    row = ShieldedParallelEnv(game, Shield()).reader.fleet(0, True).state[0]
     assert (row[L.X], row[L.Y], row[L.HEADING], row[L.SPEED], row[L.THRUST]) == (60.0, 40.0, 90.0, 1.5, 75.0)
     assert np.isnan(row[L.HEADING_ERROR])
