@@ -19,6 +19,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from steerclear.shield.exceptions import SteerclearError
 from typer.core import TyperCommand, TyperOption
 
+from .cli_examples import EXAMPLES, MANY_OPTIONS, RARE
 from .cli_files import check_files, hints_of
 from .runner import Interrupted
 from .terminal import SafeConsole
@@ -86,11 +87,43 @@ def warn(text: str) -> None:
     err().print(text, soft_wrap=True)
 
 
+ALL = "steerclear.help_all"
+"""Key of a context in which help shows every option."""
+
+
 class OnceCommand(TyperCommand):
-    """A command each of whose options counts once, but for those that may be repeated: else the last would win."""
+    """A command whose options count once, but for those that may be repeated, and whose help fits one screen.
+
+    The help of a command with many options leaves those of `RARE` to ``--help-all``, and ends with an example.
+    """
+
+    def __init__(self, *args: Any, **settings: Any) -> None:
+        super().__init__(*args, **settings)
+        many = len(self.params) > MANY_OPTIONS
+        self._rare = [option for option in self.params if many and {*option.opts} & RARE]
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the help, of the options that most users want."""
+        name, hidden = " ".join(ctx.command_path.split()[1:]), [] if ctx.meta.get(ALL) else self._rare
+        more = f"--help-all shows {len(hidden)} more options.\n\n" if hidden else ""
+        self.epilog = f"{more}Example: {EXAMPLES[name]}" if name in EXAMPLES else None
+        for option in hidden:
+            vars(option)["hidden"] = True
+        try:
+            super().format_help(ctx, formatter)
+        finally:
+            for option in hidden:
+                vars(option)["hidden"] = False
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse as usual what gives no option twice; UsageError where it does."""
+        """Parse as usual what gives no option twice; ``--help-all`` shows the whole help instead.
+
+        Raises:
+            UsageError: an option is given twice.
+        """
+        if self._rare and "--help-all" in args:
+            ctx.meta[ALL] = True
+            args = ["--help"]
         _, _, given = self.make_parser(ctx).parse_args(args=list(args))
         for option in given:
             if isinstance(option, TyperOption) and not option.multiple and given.count(option) > 1:
