@@ -35,18 +35,18 @@ COLUMNS = {
     "hdg": (4, "heading, degrees clockwise from the field's y axis"),
     "m/s": (5, "speed"),
     "age": (5, "seconds since its position was true; red: older than the limit"),
-    "wanted": (9, "what the policy, or a response, wants: speed m/s and heading"),
-    "sent": (9, "what the shield made of it, as it left; cyan: changed by the shield"),
+    "nominal": (9, "what the policy, or a response, wants: speed m/s and heading"),
+    "filtered": (9, "what the shield made of it, as it left; cyan: changed by the shield"),
     "why": (9, "why the shield sent that, see below; red: the mode that keeps it from obeying"),
     "margin": (6, "how much more room than required its best manoeuvre keeps, m; red: less than required"),
     "closest": (14, "whom it meets closest when all hold course, how near and when; yellow: too near"),
-    "bound by": (12, "what its command had to give way to"),
+    "constraint": (12, "what its command had to give way to"),
 }
 """Of the table: characters that the longest cell needs, and meaning."""
-GROWING = (("closest", 26), ("boat", 16), ("bound by", 24), ("closest", 400))
+GROWING = (("closest", 26), ("boat", 16), ("constraint", 24), ("closest", 400))
 """Where room that is left over goes, in this order, each up to a width."""
-DROPPED = ("bound by", "hdg", "m/s", "age", "closest", "why", "margin")
-"""What is left out of a terminal too narrow for all, in this order; wanted and sent stand in every one, whole."""
+DROPPED = ("constraint", "hdg", "m/s", "age", "closest", "why", "margin")
+"""What is left out of a terminal too narrow for all, in this order; nominal and filtered stand in every one, whole."""
 WHY = {
     Reason.PASSED: ("passed", "green", "the nominal command leaves the boat a way out: sent as it is"),
     Reason.LEAST_CHANGE: ("least", "cyan", "changed as little as it takes to keep clear of everything"),
@@ -64,7 +64,7 @@ WHY = {
     Reason.STOPPED: (
         "stopped",
         "bold red",
-        "beyond the hard line, or a shore too near: its link's own stop; bring it in by hand",
+        "its link's own stop: beyond the hard line bring it in by hand; off a shore it goes on once a command is clear",
     ),
 }
 MARKS = (("⚑", "has_flag", "carries the flag"), ("T", "tagged", "tagged"), ("O", "oob", "out of bounds"))
@@ -89,7 +89,7 @@ BANNERS = {
     "silent": (
         "The loop stands still: no tick for {0:.1f} s",
         _RED,
-        "the runner is stuck; each boat stops by itself 3 s after the last command it heard: take them by hand",
+        "the runner is stuck; boats stop by themselves (ArduPilot 3 s, MOOS 2 s after a command): take them by hand",
     ),
     "unknown": (
         "No boat's state is known: boats are told to stop",
@@ -296,8 +296,8 @@ def boats_table(width: int, rows: Sequence[Mapping[str, Any]]) -> Table:
             title,
             width=wide,
             no_wrap=True,
-            overflow="crop" if title in ("wanted", "sent") else "ellipsis",
-            justify="left" if title in ("boat", "why", "closest", "bound by") else "right",
+            overflow="crop" if title in ("nominal", "filtered") else "ellipsis",
+            justify="left" if title in ("boat", "why", "closest", "constraint") else "right",
         )
     for row in rows:
         table.add_row(*(row.get(title, "") for title in widths))
@@ -324,7 +324,7 @@ def _own(reading: BoatReading, decision: Decision | None, tick: Tick, near: Text
     sent_text = Text("-") if sent is None else Text(_command(sent.speed_mps, sent.heading_rad))
     if sent is not None and not sent.delivered:
         sent_text = Text("not sent", "bold red")
-    cells = {**_seen(reading, Text(_age(reading.age_s))), "wanted": "-", "sent": sent_text, "margin": "-"}
+    cells = {**_seen(reading, Text(_age(reading.age_s))), "nominal": "-", "filtered": sent_text, "margin": "-"}
     if not reading.ready:
         return {**cells, "why": Text(reading.mode or "not ready", "bold red"), "closest": Text(reading.why_not, "red")}
     if decision is None:
@@ -334,11 +334,11 @@ def _own(reading: BoatReading, decision: Decision | None, tick: Tick, near: Text
     margin_m = decision.safety_margin_m
     return {
         **cells,
-        "wanted": _command(decision.nominal_speed_mps, decision.nominal_heading_rad),
+        "nominal": _command(decision.nominal_speed_mps, decision.nominal_heading_rad),
         "margin": Text("free" if margin_m == math.inf else f"{margin_m:.1f}", "bold red" if margin_m < 0.0 else ""),
         "why": Text(*WHY[decision.reason][:2]),
         "closest": near,
-        "bound by": ", ".join(decision.active_constraints),
+        "constraint": ", ".join(decision.active_constraints),
     }
 
 

@@ -1,6 +1,6 @@
 // One game on the page: its picture, its timeline and the table of its boats.
 
-const COLUMNS = ["boat", "speed", "wanted", "sent", "shield", "margin", "state"];
+const COLUMNS = ["boat", "speed", "nominal", "filtered", "shield", "margin", "state"];
 
 function element(tag, properties = {}, ...children) {
   const made = Object.assign(document.createElement(tag), properties);
@@ -65,7 +65,7 @@ class Pane {
       badge(breached ? "breach" : "", ...this.breachText()));
     const word = (text, kind) => element("span", { className: kind, textContent: text });
     this.note.replaceChildren("timeline: ", word("share of boats whose command was changed", "orange"), ", ",
-      word("breaches", "pink"), ", captures · table: speeds m/s, compass headings, margin = certificate in m, safe from 0 up · ",
+      word("breaches", "pink"), ", captures · table: speeds m/s, compass headings, margin = room beyond the required one, m, safe from 0 up · ",
       `breach: a boat of `, this.sideText(this.game.ownTeam), ` within ${meta.separation_m} m of another, discs touch; `,
       `dashed rings: the other team among itself · `,
       `${meta.preset}, ${[...new Set(meta.platforms)].join(", ")}, seed ${meta.seed ?? "unknown"}`);

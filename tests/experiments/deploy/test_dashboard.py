@@ -171,7 +171,7 @@ def test_the_canvas_keeps_shapes_and_scale():
 
 def cell_of(lines, name, title):
     """What stands in a boat's row under a head; the table may stand beside the map."""
-    heads = next(line for line in lines if "wanted" in line and "margin" in line)
+    heads = next(line for line in lines if "nominal" in line and "margin" in line)
     end = heads.index(title) + len(title)
     row = next(line for line in lines if line[heads.index("boat") :].startswith(name))
     return row[end - 9 : end].strip()
@@ -180,17 +180,17 @@ def cell_of(lines, name, title):
 @pytest.mark.parametrize(("columns", "rows"), [(60, 24), (80, 24), (120, 40), (160, 45), (200, 30)])
 def test_what_was_wanted_and_sent_is_shown_whole(columns, rows):
     lines = shown(demo_fleet(), Moment(made_tick(demo_fleet()), 5.0), columns, rows)
-    cells = [[cell_of(lines, f"blue_{k}", title) for k in (1, 2, 3)] for title in ("wanted", "sent")]
+    cells = [[cell_of(lines, f"blue_{k}", title) for k in (1, 2, 3)] for title in ("nominal", "filtered")]
     assert cells == [["1.5 054°", "12.5 359°", "2.0 180°"], ["1.5 054°", "10.2 008°", "0.0 271°"]]
 
 
 def test_a_wide_terminal_shows_more():
     tick = made_tick(demo_fleet())
     narrow, wide = (shown(demo_fleet(), Moment(tick, 5.0), *size) for size in ((80, 24), (160, 45)))
-    assert "bound by" not in "".join(narrow)
-    heads = next(line for line in wide if "bound by" in line)
+    assert "constraint" not in "".join(narrow)
+    heads = next(line for line in wide if "constraint" in line)
     row = next(line for line in wide if "12.5 359°" in line)
-    assert row[heads.index("bound by") :].startswith("red_3"), "what binds"
+    assert row[heads.index("constraint") :].startswith("red_3"), "what binds"
     assert "…" not in row[heads.index("boat") :]
     assert any("error 0.3 m" in line for line in wide)
 
@@ -198,7 +198,7 @@ def test_a_wide_terminal_shows_more():
 @pytest.mark.parametrize("width", [1, 10, 30, 45, 60, 80, 99, 160, 400])
 def test_the_table_is_as_wide_as_it_may_be(width):
     console = Console(file=io.StringIO(), width=width, color_system=None)
-    cells = {"boat": "b" * 32, "wanted": "12.5 359°", "sent": "-2.5 007°", "closest": "c" * 90, "why": "best eff."}
+    cells = {"boat": "b" * 32, "nominal": "12.5 359°", "filtered": "-2.5 007°", "closest": "c" * 90, "why": "best eff."}
     console.print(boats_table(width, [cells]))
     lines = console.file.getvalue().splitlines()
     assert all(len(line) <= width for line in lines)
