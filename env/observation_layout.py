@@ -72,7 +72,7 @@ def bounds_of(
     keys: Sequence[Key], config: GameConfig, field: FieldGeometry, max_speed_mps: float
 ) -> tuple[Array, Array]:
     """Lower and upper bounds of raw entries, each (n,); positions take two numbers."""
-    beyond = 5.0 * max(config.agent_radius_m)
+    beyond = 5.0 * float(np.max(config.agent_radius_m))
     place = ([-beyond, -beyond], [*(field.size + beyond)])
     ranges: dict[str, Any] = {
         "bearing": (-180.0, 180.0),

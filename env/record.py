@@ -72,7 +72,9 @@ def meta_of(config: GameConfig, **settings: Any) -> dict[str, Any]:
     unknown = sorted(set(settings) - set(_BESIDE_THE_GAME))
     if unknown:
         raise TraceError(f"unknown {', '.join(unknown)}; a record takes {', '.join(_BESIDE_THE_GAME)}.")
-    (width, height), radii = config.env_bounds_m, config.agent_radius_m
+    width, height = config.env_bounds_m
+    radii: Any = config.agent_radius_m
+    platforms: Any = config.platforms
     same = ("dt_s", "decision_steps", "env_bounds_m", "team_size", "agent_ids", "catch_radius_m", "flag_keepout_m")
     game = {name: getattr(config, name) for name in (*same, "obstacles")} | {
         "corner_radius_m": config.corner_radius_m if "own_corners" in (config.capture_at, config.untag_at) else 0.0,
@@ -83,7 +85,7 @@ def meta_of(config: GameConfig, **settings: Any) -> dict[str, Any]:
         ],
         "scrimmage": config.scrimmage_m,
         "agent_radius_m": radii[0] if len(set(radii)) == 1 else radii,
-        "platforms": [platform.name for platform in config.platforms],
+        "platforms": [platform.name for platform in platforms],
         "preset": config.preset_name,
     }
     return game | _BESIDE_THE_GAME | settings

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..exceptions import ConfigError
 from ..fleet import Fleet
-from ..jit import Array, IntArray
+from ..jit import Array, BoolArray, IntArray
 from ..platforms import Platform, get_platform
 from ..platforms import layout as L
 from ..surroundings import Surroundings
@@ -242,7 +242,7 @@ def _controller(player: Any, name: str) -> tuple[float, float]:
     return (math.nan if error is None else float(error)), integral
 
 
-def _driven(players: Sequence[Any]) -> tuple[Array, Array, Array]:
+def _driven(players: Sequence[Any]) -> tuple[BoolArray, BoolArray, BoolArray]:
     """Which boats the environment drives: tagged, out of bounds, disabled, each (n,) bool."""
     tagged, oob, disabled = (
         np.array([bool(getattr(player, name, False)) for player in players])

@@ -68,20 +68,6 @@ def place_as(core, state):
     core.reset_game(0, start)
 
 
-def test_the_same_seed_gives_the_same_games_and_another_one_others():
-    one, two, other = (BatchedMctf(RANDOM, n_games=5, seed=s) for s in (3, 3, 4))
-    for t in range(30):
-        for core in (one, two, other):
-            core.step(random_actions(t, 5, 4))
-    for name in NAMES:
-        np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
-    assert not np.array_equal(one.state, other.state)
-
-
-def test_game_zero_of_a_batch_starts_like_a_single_game():
-    np.testing.assert_array_equal(BatchedMctf(RANDOM, 3, seed=8).state[0], BatchedMctf(RANDOM, 1, seed=8).state[0])
-
-
 def test_resetting_some_games_leaves_the_others_alone():
     core = BatchedMctf(RANDOM, n_games=4, seed=1)
     first = core.state.copy()

@@ -116,17 +116,6 @@ def test_rendering_without_a_mode_says_so(caplog):
     assert "without a render_mode" in caplog.text
 
 
-def test_a_picture_is_an_array_and_close_can_be_called_twice(monkeypatch):
-    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    env = MctfEnv(SMALL, render_mode="rgb_array")
-    env.reset(seed=0)
-    picture = env.render()
-    assert picture.dtype == np.uint8
-    assert picture.ndim == 3
-    env.close()
-    env.close()
-
-
 def test_filters_of_a_step_come_after_the_own_one_last_entered_first_and_are_gone_after_it():
     env, asked = MctfEnv("aamas2024"), []
 

@@ -72,14 +72,6 @@ def test_a_cut_file_is_one_clear_error(game_record, tmp_path, share):
         load(path)
 
 
-def test_a_file_of_something_else_is_not_advised_to_be_trusted(tmp_path):
-    path = tmp_path / "game.npz"
-    path.write_text("hello")
-    with pytest.raises(TraceError, match="not a record") as refused:
-        load(path)
-    assert "pickle" not in str(refused.value)
-
-
 def test_a_damaged_file_is_one_clear_error(game_record, tmp_path):
     path = save(game_record, tmp_path / "game.npz")
     content = bytearray(path.read_bytes())
@@ -95,8 +87,9 @@ def test_other_files_are_refused(tmp_path):
     with pytest.raises(TraceError, match="there is no record"):
         load(tmp_path / "none.npz")
     (tmp_path / "text.npz").write_text("hello")
-    with pytest.raises(TraceError, match="cut or not a record"):
+    with pytest.raises(TraceError, match="cut or not a record") as refused:
         load(tmp_path / "text.npz")
+    assert "pickle" not in str(refused.value)
     np.save(tmp_path / "one.npy", np.zeros(3))
     with pytest.raises(TraceError, match="cut or not a record"):
         load(tmp_path / "one.npy")
