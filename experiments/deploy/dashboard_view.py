@@ -168,17 +168,9 @@ def approaches(fleet: Fleet) -> dict[str, Approach]:
 
 @dataclass(frozen=True)
 class Moment:
-    """What is to be shown.
+    """What is to be shown: the latest tick, if any, at a time of the loop's clock, s, with delays of late ticks, s.
 
-    Attributes:
-        tick: the latest; None: none yet.
-        now_s: on the loop's clock, s.
-        stopped: why all boats are told to stop; empty: they are not.
-        hard: whether past the shield.
-        ended: why the run ends; empty: it goes on.
-        late_s: mean and worst delay of ticks of late, s.
-        menu: lines of an open menu.
-        log: latest lines of the log.
+    ``stopped`` and ``ended`` say why boats are told to stop and why the run ends; empty: they are not, and it goes on.
     """
 
     tick: Tick | None

@@ -47,10 +47,9 @@ GRACE_S = 5.0
 
 @dataclass(frozen=True)
 class Cast:
-    """Which boat of a fleet plays which agent.
+    """Which boat of a fleet plays which agent of a game.
 
     Attributes:
-        config: settings of the game.
         names: all boats of the file, in its order.
         rows: number in ``names`` of each agent's boat, agent_0 first; `NOBODY` for agents of a game without opponents.
         ours: agents the policy plays.
@@ -205,14 +204,12 @@ class Orders:
 
 
 class Play(NamedTuple):
-    """A policy's answer to one snapshot.
+    """A policy's answer to one snapshot; NaN: no usable answer, or not played by this policy.
 
     Attributes:
-        relative: (n_agents, 2) what each agent's boat is to obey, as in the game: speed m/s, heading deg relative to
-            its own; NaN: no usable answer, or not played by this policy.
+        relative: (n_agents, 2) what each agent's boat is to obey: speed m/s, heading deg relative to its own.
         driven: (n_agents,) boats the game drives: tagged, or out of bounds.
-        commands: (n_boats, 2) the same for all boats of the file: speed m/s, up to the boat's top speed, and absolute
-            heading rad.
+        commands: (n_boats, 2) the same for all boats of the file: speed m/s up to its top speed, absolute heading rad.
         problems: what was wrong with single boats' answers, a line each.
     """
 
@@ -238,11 +235,7 @@ class Player:
         self._games = 0
 
     def warm_up(self) -> None:
-        """Play one step of a game nobody sees, so that what compiles or loads late does it now.
-
-        Raises:
-            PolicyError: the policy cannot begin a game.
-        """
+        """Play one step of a game nobody sees, so that what compiles or loads late does it now."""
         if self._cast.ours:
             self._begin()
             self._ask()

@@ -109,22 +109,7 @@ class Difference(NamedTuple):
 
 @dataclass
 class Proof:
-    """What the replay found.
-
-    Attributes:
-        ticks: in the log.
-        decisions: decided again.
-        covered: of those, with a boat of ours in it.
-        same: of those, the same bit for bit.
-        unproven: of those, not the same, but after ticks that are missing, so that the shield's memory is not known.
-        different: of those, not the same though everything before is known.
-        first: the first of these.
-        missing: (number before, number after) of each stretch of missing ticks; -1 before the first.
-        strayed: commands that left for a boat and are not what was decided for it, or that did not leave.
-        unfounded: commands that left for a boat, no stops, without any decision.
-        first_sent: the first of these.
-        cut: commands an autopilot's limit cut, by boat and limit, m/s.
-    """
+    """What the replay found: counts and the first of each, see `keys.REPLAY`; ``covered``: with a boat of ours."""
 
     ticks: int = 0
     decisions: int = 0

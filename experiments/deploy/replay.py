@@ -29,20 +29,10 @@ MOST_ROWS = 12
 
 @dataclass
 class Replay:
-    """What a replay found.
+    """What a replay found, see `keys.REPLAY`.
 
     Attributes:
-        header: of the log.
-        proof: whether the shield decides the same.
-        complete: whether the log was closed properly.
-        chain: what the log's chain says.
-        damage: what could not be read.
-        began: when the log began, UTC.
-        seconds: how long it is, s.
-        reasons: how many decisions of own boats had each reason.
-        actions: ticks in which each (condition, response, subject) was in effect.
         lines: warnings and errors in the log.
-        origin: what differs between the machine and versions of the log and of this program.
         tracks, without: what happened and what would have happened; None where not asked for.
         records: of both.
         sides: by "with" and "without": closest distances, m, numbers of breaches and the breaches with verdicts.

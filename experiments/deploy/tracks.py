@@ -118,11 +118,7 @@ class TrackBuilder:
                 fixes.append((fixed_s, fleet.state[i].copy()))
 
     def finish(self) -> Tracks:
-        """The tracks.
-
-        Raises:
-            LogError: no tick, or none with boats.
-        """
+        """The tracks, or a `LogError`: there are no two ticks with boats."""
         names = tuple(name for name, fixes in self._fixes.items() if fixes)
         if len(self._times) < 2 or not names:
             raise LogError("the log holds no two ticks with boats; there is nothing to replay without the shield")
@@ -157,14 +153,12 @@ class TrackBuilder:
 
     def _decisions(self, tick: Tick) -> dict[str, Any]:
         found, decisions = {}, tick.decisions
-        for i, name in enumerate(() if decisions is None else decisions.fleet.names):
-            if (
-                decisions is None
-                or not decisions.fleet.controlled[i]
-                or (self._header.boats and name not in self._mine)
-            ):
+        if decisions is None:
+            return {}
+        for i in map(int, np.flatnonzero(decisions.fleet.controlled)):
+            name, own_rad = decisions.fleet.names[i], float(decisions.fleet.heading_rad[i])
+            if self._header.boats and name not in self._mine:
                 continue  # teammates with a shield of their own are steered by another process
-            own_rad = float(decisions.fleet.heading_rad[i])
             self._ours.add(name)
             found[name] = (
                 decisions.nominal.absolute(i, own_rad),

@@ -127,20 +127,12 @@ class Worker:
         return messages
 
     def send(self, message: bytes) -> None:
-        """Send a message after those before it.
-
-        Raises:
-            Broken: the process is gone.
-        """
+        """Send a message after those before it, or raise `Broken`: the process is gone."""
         self._unsent += HEAD.pack(len(message)) + message
         self.flush()
 
     def flush(self) -> None:
-        """Go on sending what did not fit into the pipe before.
-
-        Raises:
-            Broken: the process is gone.
-        """
+        """Go on sending what did not fit into the pipe before, or raise `Broken`: the process is gone."""
         try:
             while self._unsent:
                 self._unsent = self._unsent[os.write(self._orders, self._unsent) :]

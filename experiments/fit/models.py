@@ -104,13 +104,10 @@ def _slope(values: Array, over_s: float) -> Array:
 
 @dataclass(frozen=True)
 class Model:
-    """A kind of boat to be fitted.
+    """A kind of boat to be fitted: numbers with their name, first guess, lowest and highest value.
 
-    Attributes:
-        kind: of the platform.
-        bounds: name, first guess, lowest and highest value of each number.
-        guesses: other first guesses, each some of the numbers.
-        build: the platform of named values, its name and its top speed.
+    ``guesses`` are other first guesses, each some of the numbers; ``build`` makes the platform of named values, its
+    name and its top speed.
     """
 
     kind: str
