@@ -80,12 +80,6 @@ def count(records, folder, seeds):
     return results
 
 
-def test_a_value_of_a_wrong_form_is_told_or_refused(records, tmp_path):
-    results = count(records, tmp_path, range(FAST))
-    assert {None, False} <= set(results)
-
-
-@pytest.mark.study
-def test_many_values_of_a_wrong_form_are_told_or_refused(records, tmp_path):
-    results = count(records, tmp_path, range(1000, 1000 + MANY))
-    assert {None, False} <= set(results)
+@pytest.mark.parametrize("seeds", [range(FAST), pytest.param(range(1000, 1000 + MANY), marks=pytest.mark.study)])
+def test_a_value_of_a_wrong_form_is_told_or_refused(records, tmp_path, seeds):
+    assert {None, False} <= set(count(records, tmp_path, seeds))
