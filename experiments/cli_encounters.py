@@ -1,4 +1,4 @@
-"""Commands about scenes of a few boats: encounters, with any safety filter, and the search for those that breach it."""
+"""Commands about scenes of a few boats: encounters, with any safety filter, and the search for those that it loses."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from steerclear.shield.platforms import get_platform, known_platforms
 from steerclear.shield.platforms.files import is_path
 
 from . import cli_options as o
-from .baselines.registry import NONE, is_shield, parse_guards
+from .baselines.registry import NONE, is_shield, parse_filters
 from .console import command, finish, out, say
 from .encounters.attack import MOST_PLAYED, Search, experiment_of, passed, searches_table
 from .encounters.attack import write_all as write_searches
 from .encounters.outcomes import measure_chunk
 from .encounters.replay import record_of
-from .encounters.report import cells_table, heads_legend, write_all
+from .encounters.report import LEGEND, cells_table, write_all
 from .encounters.results import Pair, Settings, results_of
 from .encounters.scenarios import FAMILIES
 from .encounters.scene import Conditions, read_scene
@@ -28,6 +28,8 @@ from .replay_html import write_replay
 from .result_files import check_new, make_folder
 from .tables import goals_table, number_text, titled
 
+FILTER = ("--filter", "--guard")
+
 
 @dataclass(frozen=True)
 class SceneOptions:
@@ -36,7 +38,7 @@ class SceneOptions:
     radius: Annotated[float, o.option("M", "Separation to keep, m.")] = 2.5
     delay: Annotated[float, o.option("S", "From own command to effect, s, in whole steps, rounded up.")] = 0.0
     noise: Annotated[float, o.option("M", "Bound on the error of positions seen, m.")] = 0.0
-    current: Annotated[float, o.option("M/S", "Speed of a current; the guard is told it, not where to.")] = 0.0
+    current: Annotated[float, o.option("M/S", "Speed of a current; the filter is told it, not where to.")] = 0.0
 
     def given(self) -> Conditions:
         """The conditions; ConfigError where one is out of range."""
@@ -58,28 +60,30 @@ def encounters(
         str, o.option("A,B/C", "Platforms: heron, or own/other as heron/surveyor, separated by commas.")
     ] = "heron,surveyor",
     family: Annotated[str, o.option("A,B", "Families of encounters, or all.")] = "all",
-    n: Annotated[int, o.option("N", "Encounters per family, platforms and guard.", "--n")] = 1000,
+    n: Annotated[int, o.option("N", "Encounters per family, platforms and filter.", "--n")] = 1000,
     guard: Annotated[
         list[str] | None,
-        o.option("A,B", "none, shield, reach, gatekeeper, pl-cbf (:KEY=VALUE,...), or a textbook.", "--guard"),
+        o.option("A,B", "none, shield, reach, gatekeeper, pl-cbf (:KEY=VALUE,...), or a textbook.", *FILTER),
     ] = None,
-    seed: Annotated[int, o.option("N", "Of the scenes, the same for every guard.")] = 0,
-    no_judge: Annotated[bool, o.flag("Do not ask the oracle about breaches.", "--no-judge")] = False,
+    seed: Annotated[int, o.option("N", "Of the scenes, the same for every filter.")] = 0,
+    no_judge: Annotated[bool, o.flag("Do not analyse which violations were avoidable.", "--no-judge")] = False,
     scene: Annotated[list[Path] | None, o.option("FILE", "Play scenes of a file instead.", "--scene")] = None,
 ) -> None:
-    """Let boats meet in every way there is; count breaches, judge them, write table, report and replays.
+    """Let boats meet in every way there is; count separation violations, judge them, write table, report and replays.
 
-    Exit status: 0 done, 1 a shield did not keep a goal of no breaches, 2 bad input, 130 interrupted.
+    Exit status: 0 done, 1 a shield did not keep a goal of no violations, 2 bad input, 130 interrupted.
     """
-    guards = tuple(dict.fromkeys(name for text in guard or ["shield"] for name in parse_guards(text)))
+    guards = tuple(dict.fromkeys(name for text in guard or ["shield"] for name in parse_filters(text)))
     if scene:
         held = {"--platform": platform != "heron,surveyor", "--family": family != "all", "--n": n != 1000}
         held |= {f"--{name}": value != getattr(SceneOptions, name) for name, value in vars(scenes).items()}
         unused = {"--jobs": where.jobs is not None, "--resume": where.resume, "--json": where.json_file is not None}
-        _refuse_beside_scenes({**held, "--seed": seed != 0}, unused)
+        _refuse(held | {"--seed": seed != 0}, "a scene file holds its own; leave it out, or edit the file")
+        _refuse(unused, "scenes are played one after another and leave no results; leave it out")
         finish(play_scene_files(scene, guards, where.folder, not no_judge))
         return
-    families = family_names(family)
+    families = _names(family, "--family", f"all, or {', '.join(FAMILIES)}")
+    families = tuple(FAMILIES) if families == ("all",) else families
     settings = Settings(platform_pairs(platform), families, guards, n, seed, scenes.given(), not no_judge)
     run = where.run(settings.experiment())
     results = results_of(run)
@@ -92,23 +96,24 @@ def encounters(
     finish(not any(goal["met"] is False and goal["limit"] == 0.0 for goal in results["goals"]))
 
 
-def _refuse_beside_scenes(held: dict[str, bool], unused: dict[str, bool]) -> None:
-    """Refuse (ConfigError) options that say nothing about scenes: what a file holds, and what is for many games."""
-    for given, why in (
-        (held, "a scene file holds its own; leave it out, or edit the file"),
-        (unused, "scenes are played one after another and leave no results; leave it out"),
-    ):
-        named = [option for option, is_given in given.items() if is_given]
-        if named:
-            raise ConfigError(f"{', '.join(named)} beside --scene: {why}")
+def _refuse(given: dict[str, bool], why: str) -> None:
+    """Options of drawn encounters say nothing about scenes."""
+    named = ", ".join(option for option, is_given in given.items() if is_given)
+    if named:
+        raise ConfigError(f"{named} beside --scene: {why}")
+
+
+def _names(text: str, option: str, such_as: str) -> tuple[str, ...]:
+    """Names separated by commas, each once; ConfigError where there is none."""
+    names = tuple(dict.fromkeys(filter(None, (part.strip() for part in text.split(",")))))
+    if not names:
+        raise ConfigError(f"{option} names no {option.removeprefix('--')}; write {such_as}")
+    return names
 
 
 def platform_pairs(text: str) -> tuple[Pair, ...]:
     """Read ``heron,heron/surveyor`` as pairs of own and other platform."""
-    pairs = tuple(dict.fromkeys(_pair(piece.strip()) for piece in text.split(",") if piece.strip()))
-    if not pairs:
-        raise ConfigError("--platform names no platform; write e.g. heron,surveyor")
-    return pairs
+    return tuple(dict.fromkeys(map(_pair, _names(text, "--platform", "heron,surveyor"))))
 
 
 def _pair(piece: str) -> Pair:
@@ -127,20 +132,12 @@ def _pair(piece: str) -> Pair:
     return own, other or own
 
 
-def family_names(text: str) -> tuple[str, ...]:
-    """Read names of families; ``all`` is every one."""
-    names = tuple(dict.fromkeys(filter(None, (part.strip() for part in text.split(",")))))
-    if not names:
-        raise ConfigError(f"--family names none; write all, or some of {', '.join(FAMILIES)}")
-    return tuple(FAMILIES) if names == ("all",) else names
-
-
 def _show(results: dict[str, Any], folder: Path) -> None:
     console = out()
     for table in cells_table(results):
         console.print(table, "")
     if results["cells"]:
-        console.print(f"{heads_legend()}\n", style="dim")
+        console.print(f"{LEGEND}\n", style="dim")
     if results["goals"]:
         console.print(goals_table(results["goals"]), "")
     say(*(f"not played: {one['guard']}, {one['family']}: {one['error']}" for one in results["failed"]))
@@ -148,10 +145,13 @@ def _show(results: dict[str, Any], folder: Path) -> None:
 
 
 def play_scene_files(paths: Sequence[Path], guards: Sequence[str], folder: Path | None, judge: bool = True) -> bool:
-    """Play every scene of the files with every guard; print a table, write a replay when there is a folder.
+    """Play every scene of the files with every filter; print a table, write a replay when there is a folder.
 
     Returns:
-        Whether no shield had an avoidable breach.
+        Whether no shield was hit avoidably.
+
+    Raises:
+        SteerclearError: a file that is no scene, a filter that cannot be made, or a folder with another replay.
     """
     replay = None if folder is None else folder / "replay.html"
     check_new(replay, "--out")
@@ -160,14 +160,14 @@ def play_scene_files(paths: Sequence[Path], guards: Sequence[str], folder: Path 
         scenes, conditions = read_scene(path)
         for guard in guards:
             columns = measure_chunk(scenes, guard, conditions, judge)
-            hits = int((columns["breaches_teammate"] + columns["breaches_opponent"]).sum())
-            avoidable = int(columns["avoidable"].sum())
-            rows.append([path.name, guard, number_text(float(columns["closest_m"].min())), f"{hits}", f"{avoidable}"])
+            hits, avoidable = columns["breaches_teammate"] + columns["breaches_opponent"], columns["avoidable"].sum()
+            closest = number_text(float(columns["closest_m"].min()))
+            rows.append([path.name, guard, closest, f"{hits.sum():.0f}", f"{avoidable:.0f}"])
             avoided = avoided and not (avoidable and is_shield(guard))
             if replay is not None:
                 played, worst = play(scenes, guard, conditions), int(columns["game"][columns["closest_m"].argmin()])
                 records.append(record_of(played, worst, f"{path.stem}, {guard}", guard != NONE))
-    out().print(titled("Scenes", ["file", "guard", "closest, m", "breaches", "avoidable"], rows))
+    out().print(titled("Scenes", ["file", "filter", "closest, m", "violations", "avoidable"], rows))
     if replay is not None:
         make_folder(replay.parent)
         say(write_replay(records, replay, title="Scenes"))
@@ -181,7 +181,7 @@ class SearchOptions:
     platform: Annotated[str, o.option("A[/B]", "Own platform, or own/attackers'.")] = "heron"
     attackers: Annotated[int, o.option("N", "Attackers, 1 to 3.")] = 1
     own: Annotated[int, o.option("N", "Own boats, 1 to 6.")] = 1
-    guard: Annotated[str, o.option("NAME", "What is attacked, as in encounters.")] = "shield"
+    guard: Annotated[str, o.option("NAME", "Safety filter to attack, as in encounters.", *FILTER)] = "shield"
     restarts: Annotated[int, o.option("N", "Searches, each from its own start.")] = 8
     population: Annotated[int, o.option("N", "Opponents per generation.")] = 64
     generations: Annotated[int, o.option("N", "Generations per search, at most.")] = 30
@@ -197,11 +197,11 @@ def attack(
 ) -> None:
     """Search for opponents that get within the radius although it could be kept; keep what is found as scenes.
 
-    Exit status: 0 done, 1 an avoidable breach with the shield on, 2 bad input, 130 interrupted.
+    Exit status: 0 done, 1 an avoidable violation with the shield on, 2 bad input, 130 interrupted.
     """
-    guards = parse_guards(what.guard)
+    guards = parse_filters(what.guard)
     if len(guards) != 1:
-        raise ConfigError(f"--guard names {len(guards)} guards; attack one at a time")
+        raise ConfigError(f"--filter names {len(guards)} safety filters; attack one at a time")
     if replay:
         finish(play_scene_files(replay, guards, where.folder))
         return
@@ -211,7 +211,6 @@ def attack(
     check_count("--restarts", what.restarts, 1, MOST_PLAYED)
     given, sizes = scenes.given(), (what.population, what.generations)
     first = Search(*pairs[0], what.attackers, what.own, guards[0], given, what.seed, 0, *sizes)
-    first.duel()
     run = where.run(experiment_of(first, what.restarts))
     results = write_searches(run)
     if not run.interrupted:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from steerclear.shield.exceptions import SteerclearError, TableError
 from steerclear.shield.platforms.registry import get_platform
-from steerclear.shield.tables.files import SHIPPED, cache_folder, check_parameters, load_table, read_table, save_table
+from steerclear.shield.tables import files as F
 from steerclear.shield.tables.make import COARSER, RADII_M, RUNS, check_radii, coarser, make_table
 from steerclear.shield.tables.settings import problem_of, read_other_may
 from steerclear.shield.tables.solve import Notice
@@ -18,18 +19,7 @@ from steerclear.shield.tables.solve import Notice
 from . import cli_options as o
 from .cli_games import met
 from .console import App, Interrupted, bars, command, finish, out, progress, say
-from .reach.pages import (
-    LOOKED_UP,
-    PLAYED_HEADS,
-    SETS_HEADS,
-    check_picture,
-    draw_sets,
-    played_content,
-    played_rows,
-    sets_content,
-    sets_rows,
-    show_card,
-)
+from .reach import pages as P
 from .reach.sets import PlayedSet, compare_sets, looks_up, places, played_experiment, sets_config
 from .result_files import NEW, check_new, write_json
 from .runner import RESULTS_FILE, execute
@@ -51,6 +41,7 @@ class BoatOptions:
 
 OtherMay = Annotated[str, o.option("MODE", "What the other boat may do: worst-case or cooperative.")]
 Radius = Annotated[float, o.option("M", "Separation radius, m.")]
+Picture = Annotated[Path | None, o.option("FILE", "Also draw the sets, as PNG or SVG; a new file."), NEW]
 
 
 @app.command()
@@ -83,23 +74,21 @@ def solve(
     problem = coarser(problem, 2.0) if quick else problem
     radii, runs = tuple(radius) if radius else RADII_M, RUNS // 20 if quick else RUNS
     check_radii(problem, radii)
-    target = out_file or cache_folder() / f"{problem.name}.npz"
+    target = out_file or F.cache_folder() / f"{problem.name}.npz"
     check_new(target, "--out")
     kept = checkpoint or target.with_name(target.name + ".checkpoint")
     try:
         with bars() as begin:
 
             def stage(name: str) -> Notice:
-                notice = begin(name)
-                return lambda done, total, residual_m: notice(
-                    done, f"largest change {residual_m:.3f} m" if residual_m else "", total
-                )
+                tell = begin(name)
+                return lambda done, total, left_m: tell(done, f"largest change {left_m:.3f} m" if left_m else "", total)
 
             table = make_table(problem, radii, threads=jobs, checkpoint=kept, runs=runs, stage=stage)
     except KeyboardInterrupt:
         raise Interrupted(f"interrupted; what was solved is kept in {kept}: the same command goes on") from None
-    save_table(table, target)
-    show_card(out(), table.card)
+    F.save_table(table, target)
+    P.show_card(out(), table.card)
     say(f"written to {target}, {target.stat().st_size / 1e6:.2f} MB")
 
 
@@ -113,27 +102,27 @@ def show(
         o.option("M", "Separation radius that --picture draws, m; may be repeated.", "--radius", default="2.5, 4"),
     ] = None,
     file: Annotated[Path | None, o.option("FILE", "A table file instead of the installed one.")] = None,
-    picture: Annotated[Path | None, o.option("FILE", "Also draw the sets, as PNG or SVG; a new file."), NEW] = None,
+    picture: Picture = None,
 ) -> None:
     """Show a table's card and the sets in which a radius cannot be kept."""
-    check_picture(picture)
+    P.check_picture(picture)
     radii = tuple(radius) if radius else RADII_M
     if radius and picture is None:
         raise TableError("--radius is what --picture draws; the card has its own radii: give --picture FILE as well")
     if file is None:
-        table = load_table(boats.own, boats.other, other_may)
+        table = F.load_table(boats.own, boats.other, other_may)
     else:
         mode = read_other_may(other_may)
         try:
-            table = read_table(file)
-            check_parameters(table.card, get_platform(boats.own), get_platform(boats.other), mode)
+            table = F.read_table(file)
+            F.check_parameters(table.card, get_platform(boats.own), get_platform(boats.other), mode)
         except TableError as error:
             words = "is left as it is: name that table's boats, or leave --file out"
             raise TableError(f"{error}; {file} {words}") from error
     check_radii(problem_of(boats.own, boats.other, other_may), radii)
-    show_card(out(), table.card)
+    P.show_card(out(), table.card)
     if picture is not None:
-        draw_sets(table, radii, picture)
+        P.draw_sets(table, radii, picture)
         say(f"picture: {picture}")
 
 
@@ -147,20 +136,28 @@ def compare(
     Exit status: 0 the shield's is nowhere more than 1.15 times as large, and nowhere calls safe more than 2 % of what
     the table calls lost; 1 somewhere it does, 2 bad input.
     """
-    values, started = load_table(boats.own, boats.other, "worst-case"), time.perf_counter()
+    values, started = F.load_table(boats.own, boats.other, "worst-case"), time.perf_counter()
     check_radii(problem_of(boats.own, boats.other), (radius,))
     given = o.key_values(shield_set, "--shield-set")
     config = sets_config(radius, given)
     with progress("sets", len(places(values))) as notice:
         pairs = compare_sets(values, config, notice)
     settings = {"own": boats.own, "other": boats.other, "radius_m": radius, "shield": given}
-    content = sets_content(settings, pairs, looks_up(values, config), started)
-    out().print(titled(f"{boats.own} meets {boats.other}, {radius:g} m", SETS_HEADS, sets_rows(pairs)))
-    out().print(goals_table(content["goals"]))
+    content = P.sets_content(settings, pairs, looks_up(values, config), started)
+    _show(boats, radius, P.SETS_COLUMNS, pairs, content)
     if content["looked_up"]:
-        out().print(" ".join(LOOKED_UP.split()))
+        out().print(" ".join(P.LOOKED_UP.split()))
     write_json(json_file, content)
     finish(met(content))
+
+
+def _show(
+    boats: BoatOptions, radius_m: float, columns: Mapping[str, str], sets: Sequence[Any], content: Mapping[str, Any]
+) -> None:
+    """Print a table of sets and its goals."""
+    title = f"{boats.own} meets {boats.other}, {radius_m:g} m"
+    out().print(titled(title, [*columns], P.rows_of(sets, columns)))
+    out().print(goals_table(content["goals"]))
 
 
 @app.command()
@@ -190,9 +187,8 @@ def play(
         run = execute(experiment, folder, workers, resume, notice)
     run.end()
     sets = [PlayedSet(**row) for row in run.rows]
-    content = played_content(run.head(), sets)
-    out().print(titled(f"{boats.own} meets {boats.other}, {radius:g} m", PLAYED_HEADS, played_rows(sets)))
-    out().print(goals_table(content["goals"]))
+    content = P.played_content(run.head(), sets)
+    _show(boats, radius, P.PLAYED_COLUMNS, sets, content)
     run.write(content)
     say(folder / RESULTS_FILE)
     write_json(json_file, content)
@@ -210,7 +206,7 @@ def check(
 
     Exit status: 0 all in order, 1 one is damaged, made for other parameters or not converged, 2 no table found.
     """
-    paths = files or [path for folder in (SHIPPED, cache_folder()) for path in sorted(folder.glob("*.npz"))]
+    paths = files or [path for folder in (F.SHIPPED, F.cache_folder()) for path in sorted(folder.glob("*.npz"))]
     if not paths:
         raise TableError("no table is installed; make one with: steerclear reach solve --own heron --other heron")
     for path in paths:
@@ -224,8 +220,8 @@ def check(
 def _fault(path: Path) -> str:
     """What is wrong with a table file; empty when nothing is."""
     try:
-        card = read_table(path).card
-        check_parameters(card, get_platform(card.own), get_platform(card.other), read_other_may(card.other_may))
+        card = F.read_table(path).card
+        F.check_parameters(card, get_platform(card.own), get_platform(card.other), read_other_may(card.other_may))
     except SteerclearError as error:
         return str(error)
     for radius, change in card.convergence.items():

@@ -1,4 +1,4 @@
-"""What guards of a batch of games share: the checks of what they are given, and the arrays they answer with."""
+"""What safety filters of a batch of games share: checks of what they are given, and the arrays they answer with."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from ..jit import kernel
 
 
 class Games(NamedTuple):
-    """What is decided about, and what is written, of B games of n boats, or of one of them; see `BatchGuard`."""
+    """What is decided about, and what is written, of B games of n boats, or of one of them; see `BatchFilter`."""
 
     state: Array
-    wanted: Array
+    nominal: Array
     ours: BoolArray
     memory: Array
-    sent: Array
+    filtered: Array
     reason: IntArray
     safety_margin_m: Array
 
@@ -31,15 +31,15 @@ class Games(NamedTuple):
 @kernel
 def game_of(games: Games, b: int) -> Games:
     """One of the games: arrays without the leading games axis."""
-    state, wanted, ours, memory, sent, reason, safety_margin_m = games
-    return Games(state[b], wanted[b], ours[b], memory[b], sent[b], reason[b], safety_margin_m[b])
+    state, nominal, ours, memory, filtered, reason, safety_margin_m = games
+    return Games(state[b], nominal[b], ours[b], memory[b], filtered[b], reason[b], safety_margin_m[b])
 
 
-class BatchGuard(ABC):
+class BatchFilter(ABC):
     """Commands of B games of the same fleet, filtered in the place where the batched shield stands.
 
     Args:
-        name: of the guard, for messages.
+        name: of the filter, for messages.
         config: settings.
         games: number of games B.
         platforms: platforms of the n boats.
@@ -48,7 +48,7 @@ class BatchGuard(ABC):
     Attributes:
         reason: (B, n) why each command is what it is.
         safety_margin_m: (B, n) margin left, m, inf where nobody is near.
-        sent: (B, n, 2) the commands of the last decision.
+        filtered: (B, n, 2) the commands of the last decision.
         memory: (B, n, columns) what is kept of each boat between decisions.
         radius_m: distance to keep: separation, buffer and both position errors, m.
         params: (n, N_PARAM) platform rows.
@@ -64,63 +64,52 @@ class BatchGuard(ABC):
         self, name: str, config: ShieldConfig, games: int, platforms: tuple[str | Platform, ...], team: tuple[int, ...]
     ) -> None:
         if config.delay_s > 0:
-            raise ConfigError(f"delay_s is {config.delay_s}; guard {name!r} knows no delay, set 0")
+            raise ConfigError(f"delay_s is {config.delay_s}; filter {name!r} knows no delay, set 0")
         if isinstance(games, bool) or not isinstance(games, (int, np.integer)) or games < 1:
             raise ConfigError(f"games is {games!r}; give a whole number >= 1")
         if len(platforms) != len(team) or not platforms:
             raise ConfigError(f"{len(platforms)} platforms and {len(team)} team entries; give one of each per boat")
-        self.name, self.config = name, config
+        self.name, self.config, self.team = name, config, np.array(team, dtype=np.int64)
         self._platforms = [get_platform(kind) for kind in platforms]
         self.params = np.array([kind.pack() for kind in self._platforms])
         self.radius_m = config.separation_m + config.buffer_m + 2.0 * config.position_error_m
         shape = (int(games), len(platforms))
-        self.reason = np.zeros(shape, np.int64)
-        self.safety_margin_m = np.full(shape, np.inf)
-        self.sent = np.zeros((*shape, 2))
-        self.memory = np.full((*shape, self.columns), self.forgotten)
+        self.reason, self.safety_margin_m = np.zeros(shape, np.int64), np.full(shape, np.inf)
+        self.filtered, self.memory = np.zeros((*shape, 2)), np.full((*shape, self.columns), self.forgotten)
 
     def reset(self, mask: BoolArray | None = None) -> None:
         """Forget the last decisions of the games in ``mask`` (B,), or of all."""
         which = slice(None) if mask is None else mask
-        self.reason[which] = 0
-        self.safety_margin_m[which] = np.inf
-        self.memory[which] = self.forgotten
+        self.reason[which], self.safety_margin_m[which], self.memory[which] = 0, np.inf, self.forgotten
 
-    def decide(self, state: Array, wanted: Array, ours: BoolArray) -> Array:
+    def decide(self, state: Array, nominal: Array, ours: BoolArray) -> Array:
         """Filtered commands.
 
         Args:
             state: (B, n, N_STATE) boat states.
-            wanted: (B, n, 2) speed m/s and relative heading deg.
+            nominal: (B, n, 2) speed m/s and relative heading deg.
             ours: (B, n) boats to decide for.
 
         Returns:
             (B, n, 2) commands, reused by the next call. ``reason`` and ``safety_margin_m`` (B, n) tell why.
 
         Raises:
-            FleetError: an array has the wrong shape, a state is not finite, or what else the guard cannot decide on.
+            FleetError: an array has the wrong shape, a state is not finite, or what else the filter cannot decide on.
         """
-        state, wanted, ours = np.asarray(state), np.asarray(wanted), np.asarray(ours)
-        self._check(state, wanted, ours)
-        self.sent[:], self.reason[:], self.safety_margin_m[:] = wanted, 0, np.inf
-        asked = np.ascontiguousarray(state, dtype=np.float64), np.ascontiguousarray(wanted, dtype=np.float64)
+        shapes = {"state": (*self.reason.shape, L.N_STATE), "nominal": self.filtered.shape, "ours": self.reason.shape}
+        for (what, shape), array in zip(shapes.items(), (state, nominal, ours), strict=True):
+            if np.shape(array) != shape:
+                raise FleetError(f"{what} has shape {np.shape(array)}; expected {shape}")
+        state, nominal = (np.ascontiguousarray(array, dtype=np.float64) for array in (state, nominal))
         boats = np.ascontiguousarray(ours, dtype=np.bool_)
-        self._decide(Games(*asked, boats, self.memory, self.sent, self.reason, self.safety_margin_m))
-        return self.sent
-
-    def _check(self, state: Array, wanted: Array, ours: BoolArray) -> None:
-        for what, array, shape in (
-            ("state", state, (*self.reason.shape, L.N_STATE)),
-            ("wanted", wanted, self.sent.shape),
-            ("ours", ours, self.reason.shape),
-        ):
-            if array.shape != shape:
-                raise FleetError(f"{what} has shape {array.shape}; expected {shape}")
         if not (np.abs(state[:, :, : L.SPEED_ERROR]) <= LARGEST).all() or (np.abs(state) > LARGEST).any():
             raise FleetError(f"a boat's position, heading, speed, thrust or rudder is not finite or beyond {LARGEST:g}")
-        if self.needs_commands and not (np.abs(wanted[ours.astype(bool)]) <= LARGEST).all():
+        if self.needs_commands and not (np.abs(nominal[boats]) <= LARGEST).all():
             raise FleetError(f"a nominal command is not finite or beyond {LARGEST:g}; give a speed and a heading")
+        self.filtered[:], self.reason[:], self.safety_margin_m[:] = nominal, 0, np.inf
+        self._decide(Games(state, nominal, boats, self.memory, self.filtered, self.reason, self.safety_margin_m))
+        return self.filtered
 
     @abstractmethod
     def _decide(self, games: Games) -> None:
-        """Write commands, reasons and certificates; commands are the wanted ones so far, and the arrays contiguous."""
+        """Write commands, reasons and margins; commands are the nominal ones so far, and the arrays contiguous."""

@@ -5,7 +5,7 @@ Rollouts" (arXiv 2605.16588), and the code its authors published (github.com/tkk
 m is the least clearance of its rollout, V_m(x) = min over t in [0, T] of h(x_m(t)). Of the policies with V_m > 0 the
 least invasive is taken, where there is none that of the greatest value, and the program is
 
-    minimise |u - u_wanted|^2   subject to   dV_m/dt >= -alpha V_m,   limits of u.
+    minimise |u - u_nominal|^2   subject to   dV_m/dt >= -alpha V_m,   limits of u.
 
 Where it has no answer, or one that does not keep the row, the boat follows the policy itself, as in the authors' code.
 The row is held against the boat's own model: of a boat whose rudder swings from side to side a line says too little.
@@ -14,7 +14,7 @@ What the paper leaves to the user, and what stands here:
 
 | left open | here |
 | --- | --- |
-| library | the nominal command held; the mode taken last, anchored as it was; `rollouts.library` from the heading now |
+| library | the nominal command held; the mode taken last, anchored as it was; `rollouts.LIBRARY` from the heading now |
 | inputs u | acceleration and turn rate as shares of braking and of the largest turn now, as the textbook filters have |
 | dV_m/dt | the step of the sampled boat, (V_m(x+) - V_m(x)) / dt, x+ by hull and autopilot, others one step on |
 | its gradient in u | finite differences of V_m(x+) by `DIFFERENCE` of each input |
@@ -25,10 +25,9 @@ What the paper leaves to the user, and what stands here:
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from steerclear.experiments.baselines.active_set import OPTIMAL, project
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.step import step_boat
@@ -36,11 +35,12 @@ from steerclear.shield.platforms.usv import wrap_degrees
 
 from ..jit import kernel
 from . import rollouts as R
+from .active_set import OPTIMAL, project
 from .base import Games, game_of
 from .unicycle import TOLERANCE, command_of_inputs, holds, inputs_of_command
 
 PASSED, CHANGED, POLICY = 0, 1, 2
-WANTED, LAST, BEFORE = 0, 1, 2
+NOMINAL, LAST, BEFORE = 0, 1, 2
 """The first modes, and how many come before the library's.
 
 The mode taken last stays among them, in columns 1 and 2 of a plan: the library turns with the boat, and what was safe
@@ -51,11 +51,11 @@ DIFFERENCE = 0.1
 SLACK_M = 1e-3
 """How far an answer may miss its row by the boat's model, m in a step."""
 SAME = 1e-9
-"""Inputs this near to the wanted ones are the wanted ones."""
+"""Inputs this near to the nominal ones are the nominal ones."""
 
 
 class Inputs(NamedTuple):
-    """The wanted inputs ``z0`` (2,), the largest turn rate, rad/s, and the least and greatest of both inputs (2, 2)."""
+    """Nominal inputs ``z0`` (2,), the largest turn rate, rad/s, and the least and greatest of both inputs (2, 2)."""
 
     z0: Array
     unit: float
@@ -110,23 +110,6 @@ def value_of(setup: R.Setup, i: int, start: Array, k: int, speed: float, heading
 
 
 @kernel
-def _next_states(setup: R.Setup, i: int, state: Array, z0: Array, unit: float, box: Array, later: Array) -> Array:
-    """Write the states (3, N_STATE) after the wanted inputs and with either of them shifted; returns the shifts."""
-    shift = np.empty(2)
-    for k in range(2):
-        shift[k] = DIFFERENCE if z0[k] + DIFFERENCE <= box[k, 1] else -DIFFERENCE
-    params, limits = setup.params[i], setup.limits[i]
-    for k in range(3):
-        z = z0.copy()
-        if k > 0:
-            z[k - 1] += shift[k - 1]
-        speed, turn = command_of_inputs(params, limits, state, z, unit, setup.dt_s)
-        later[k] = state
-        step_boat(params, later[k], speed, turn, setup.dt_s)
-    return shift
-
-
-@kernel
 def answer_of(row: Array, need: float, box: Array, z0: Array, z: Array) -> bool:
     """Write the nearest inputs to ``z0`` within the box that meet ``row z >= need``; whether there are any."""
     z[:] = z0
@@ -144,108 +127,92 @@ def answer_of(row: Array, need: float, box: Array, z0: Array, z: Array) -> bool:
 
 
 @kernel
-def _command_of_mode(setup: R.Setup, i: int, m: int, state: Array, wanted: Array, plan: Array) -> tuple[float, float]:
+def _command_of_mode(setup: R.Setup, i: int, m: int, state: Array, nominal: Array, plan: Array) -> tuple[float, float]:
     """Speed and absolute heading of mode m: the nominal command held, the mode taken last, then the library."""
-    if m == WANTED:
-        return wanted[0], wrap_degrees(state[L.HEADING] + wanted[1])
+    if m == NOMINAL:
+        return nominal[0], wrap_degrees(state[L.HEADING] + nominal[1])
     if m == LAST:
         return plan[1], plan[2]
     return R.command_of(setup, i, m - BEFORE, state)
 
 
 @kernel
-def _row_of(
-    setup: R.Setup,
-    i: int,
-    state: Array,
-    later: Array,
-    shift: Array,
-    z0: Array,
-    command: tuple[float, float],
-    around: R.Around,
-    row: Array,
-) -> tuple[float, float]:
-    """Write a mode's row over the inputs; returns its right-hand side and the mode's value V, m."""
-    values = np.empty(4)
-    for k in range(4):
-        start = state if k == 0 else later[k - 1]
-        values[k] = value_of(setup, i, start, min(k, 1), command[0], command[1], around)
-    for k in range(2):
-        row[k] = (values[k + 2] - values[1]) / (shift[k] * setup.dt_s)
-    have = (values[1] - values[0]) / setup.dt_s + setup.alpha_per_s * values[0]
-    return row[0] * z0[0] + row[1] * z0[1] - have, values[0]
-
-
-@kernel
-def _pleases(setup: R.Setup, row: Array, need: float, box: Array, z0: Array, z: Array) -> float:
-    """How little a mode takes away: the share of the inputs it leaves, or less the change of the wanted ones."""
-    if setup.pick == R.AREA:
-        return share_left(row, need, box)
-    if not answer_of(row, need, box, z0, z):
-        return -math.inf
-    return -math.hypot(z[0] - z0[0], z[1] - z0[1])
-
-
-@kernel
-def _most(setup: R.Setup) -> float:
-    """What a mode that takes nothing away scores, to rounding."""
-    return (1.0 if setup.pick == R.AREA else 0.0) - SAME
-
-
-@kernel
-def _better(value: float, score: float, best_value: float, best_score: float) -> bool:
-    """Whether a mode goes before the best so far: a safe one before others, then by its score, then by its value."""
-    if value > 0.0 and best_value > 0.0:
-        return score > best_score + SAME or (score >= best_score - SAME and value > best_value)
-    return value > best_value
+def _later_states(setup: R.Setup, i: int, state: Array, inputs: Inputs, later: Array) -> Array:
+    """Write the states (4, N_STATE) now, after the nominal inputs, and with either shifted; returns the shifts (2,)."""
+    shift = np.empty(2)
+    later[0] = state
+    for k in range(3):
+        z = inputs.z0.copy()
+        if k > 0:
+            fits = z[k - 1] + DIFFERENCE <= inputs.box[k - 1, 1]
+            shift[k - 1] = DIFFERENCE if fits else -DIFFERENCE
+            z[k - 1] += shift[k - 1]
+        speed, turn = command_of_inputs(setup.params[i], setup.limits[i], state, z, inputs.unit, setup.dt_s)
+        later[k + 1] = state
+        step_boat(setup.params[i], later[k + 1], speed, turn, setup.dt_s)
+    return shift
 
 
 @kernel
 def take_mode(
-    setup: R.Setup, i: int, state: Array, wanted: Array, plan: Array, inputs: Inputs, around: R.Around, row: Array
+    setup: R.Setup, i: int, state: Array, nominal: Array, plan: Array, inputs: Inputs, around: R.Around, row: Array
 ) -> tuple[int, float, float]:
-    """The mode taken, its row (written), right-hand side and value; safe ones first, by what pleases, then V."""
-    z0, unit, box = inputs
-    later, trial, z = np.empty((3, L.N_STATE)), np.empty(2), np.empty(2)
-    shift = _next_states(setup, i, state, z0, unit, box, later)
+    """The mode taken, its row (written), right-hand side and value; safe ones first, by how little they take, then V.
+
+    What a mode leaves is the share of the inputs in which its row holds, or less the change of the nominal ones.
+    """
+    z0, later, trial, z, values = inputs.z0, np.empty((4, L.N_STATE)), np.empty(2), np.empty(2), np.empty(4)
+    shift, most = _later_states(setup, i, state, inputs, later), (1.0 if setup.pick == R.AREA else 0.0) - SAME
     best, best_need, best_value, best_score = -1, 0.0, -math.inf, -math.inf
     for m in range(setup.library.shape[0] + BEFORE):
-        command = _command_of_mode(setup, i, m, state, wanted, plan)
-        need, value = _row_of(setup, i, state, later, shift, z0, command, around, trial)
-        score = _pleases(setup, trial, need, box, z0, z) if value > 0.0 else -math.inf
-        if best < 0 or _better(value, score, best_value, best_score):
+        speed, heading = _command_of_mode(setup, i, m, state, nominal, plan)
+        for k in range(4):
+            values[k] = value_of(setup, i, later[k], min(k, 1), speed, heading, around)
+        value, score = values[0], -math.inf
+        for k in range(2):
+            trial[k] = (values[k + 2] - values[1]) / (shift[k] * setup.dt_s)
+        have = (values[1] - values[0]) / setup.dt_s + setup.alpha_per_s * value
+        need = trial[0] * z0[0] + trial[1] * z0[1] - have
+        if value > 0.0 and setup.pick == R.AREA:
+            score = share_left(trial, need, inputs.box)
+        elif value > 0.0 and answer_of(trial, need, inputs.box, z0, z):
+            score = -math.hypot(z[0] - z0[0], z[1] - z0[1])
+        better = value > best_value
+        if value > 0.0 and best_value > 0.0:
+            better = score > best_score + SAME or (score >= best_score - SAME and better)
+        if best < 0 or better:
             best, best_need, best_value, best_score = m, need, value, score
             row[:] = trial
-        if value > 0.0 and row[0] * z0[0] + row[1] * z0[1] >= best_need and best_score >= _most(setup):
+        if value > 0.0 and row[0] * z0[0] + row[1] * z0[1] >= best_need and best_score >= most:
             break  # takes nothing away: no other mode can do better
     return best, best_need, best_value
 
 
 @kernel
-def _decide_boat(setup: R.Setup, i: int, state: Array, around: R.Around, plan: Array, sent: Array) -> tuple[int, float]:
+def _decide_boat(setup: R.Setup, i: int, state: Array, around: R.Around, plan: Array, out: Array) -> tuple[int, float]:
     """Take a mode, note it in the plan, solve its program; returns why the command is what it is, and the value, m."""
     params, limits = setup.params[i], setup.limits[i]
     box, z0, z, row = np.empty((2, 2)), np.empty(2), np.empty(2), np.empty(2)
-    unit = inputs_of_command(params, limits, state, sent, setup.dt_s, z0, box)
-    m, need, value = take_mode(setup, i, state, sent, plan, Inputs(z0, unit, box), around, row)
-    plan[1], plan[2] = _command_of_mode(setup, i, m, state, sent, plan)
+    unit = inputs_of_command(params, limits, state, out, setup.dt_s, z0, box)
+    m, need, value = take_mode(setup, i, state, out, plan, Inputs(z0, unit, box), around, row)
+    plan[1], plan[2] = _command_of_mode(setup, i, m, state, out, plan)
     if answer_of(row, need, box, z0, z):
         same = abs(z[0] - z0[0]) <= SAME and abs(z[1] - z0[1]) <= SAME
         if not same:
-            sent[0], sent[1] = command_of_inputs(params, limits, state, z, unit, setup.dt_s)
+            out[0], out[1] = command_of_inputs(params, limits, state, z, unit, setup.dt_s)
         after = state.copy()
-        step_boat(params, after, sent[0], sent[1], setup.dt_s)
+        step_boat(params, after, out[0], out[1], setup.dt_s)
         then = value_of(setup, i, after, 1, plan[1], plan[2], around)
         if then >= (1.0 - setup.alpha_per_s * setup.dt_s) * value - SLACK_M:
             return PASSED if same else CHANGED, value
-    sent[0], sent[1] = plan[1], wrap_degrees(plan[2] - state[L.HEADING])
+    out[0], out[1] = plan[1], wrap_degrees(plan[2] - state[L.HEADING])
     return POLICY, value
 
 
 @kernel
 def decide_game(setup: R.Setup, game: Games) -> None:
-    """Decide for the boats of ours, one after the other; ``sent`` starts as the nominal commands."""
-    state, _, ours, plan, sent, reason, clear_m = game
+    """Decide for the boats of ours, one after the other; ``filtered`` starts as the nominal commands."""
+    state, _, ours, plan, filtered, reason, clear_m = game
     n, steps = state.shape[0], setup.steps + 1
     path, grow, near = np.empty((n, steps + 1, 2)), np.empty(n), np.empty(n, np.bool_)
     around = R.Around(near, path, grow)
@@ -256,9 +223,9 @@ def decide_game(setup: R.Setup, game: Games) -> None:
         if plan[i, 0] == R.NO_PLAN:
             plan[i, 1], plan[i, 2] = state[i, L.SPEED], state[i, L.HEADING]
         if R.mark_near(setup, i, state, steps, near):
-            reason[i], clear_m[i] = _decide_boat(setup, i, state[i], around, plan[i], sent[i])
-        plan[i, 0], plan[i, 3] = 0.0, sent[i, 0]
-        plan[i, 4] = wrap_degrees(state[i, L.HEADING] + sent[i, 1])
+            reason[i], clear_m[i] = _decide_boat(setup, i, state[i], around, plan[i], filtered[i])
+        plan[i, 0], plan[i, 3] = 0.0, filtered[i, 0]
+        plan[i, 4] = wrap_degrees(state[i, L.HEADING] + filtered[i, 1])
         R.roll_plan(setup, i, state[i], plan[i], path[i])
 
 
@@ -269,10 +236,15 @@ def decide_games(setup: R.Setup, games: Games) -> None:
         decide_game(setup, game_of(games, b))
 
 
-class PolicyLibrary(R.RolloutGuard):
-    """PL-CBF."""
+class PolicyLibrary(R.RolloutFilter):
+    """PL-CBF.
 
-    kind = R.LibrarySettings
+    Settings: ``horizon_s``, length of a rollout (T of the paper), ``alpha_per_s``, rate of the row dV/dt >= -alpha V,
+    and ``pick``, the safe mode taken: ``area`` the one that leaves the largest part of the inputs, as the authors'
+    published code does, ``nearest`` the one whose program changes the nominal inputs least.
+    """
+
+    defaults: ClassVar[dict[str, Any]] = {"horizon_s": 10.0, "alpha_per_s": 1.0, "pick": "area"}
 
     def _decide(self, games: Games) -> None:
         decide_games(self._setup, games)

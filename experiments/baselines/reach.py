@@ -1,7 +1,7 @@
-"""`ReachGuard`: a safety filter of the reachability value tables alone, in the place where the shield stands.
+"""`ReachFilter`: a safety filter of the reachability value tables alone, in the place where the shield stands.
 
 Margins of pairs of boats are h_ij = V(x_i, x_j) - R, V the distance that can be kept from now on by the value tables:
-against the worst an opponent can do for as long as it is feared, or with the help of a teammate. Within a step, of
+against the worst an opponent can do within the adversary horizon, or with the help of a teammate. Within a step, of
 which the tables say nothing, opponents move in each of three ways, and the least of the three values counts.
 
 One decision for all boats of ours in a game: screen, program, exact check, else the rudder of greatest value. The
@@ -20,7 +20,6 @@ from itertools import permutations
 from typing import Any, NamedTuple
 
 import numpy as np
-from steerclear.experiments.baselines.active_set import OPTIMAL, project
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import ConfigError, TableError
 from steerclear.shield.jit import Array, BoolArray, IntArray, copy_row
@@ -35,7 +34,8 @@ from steerclear.shield.tables.settings import OtherMay
 from steerclear.shield.workspace import BACKUP, BEST_EFFORT, HELD, LARGEST_COMMAND, LEAST_CHANGE, NOT_COVERED, PASSED
 
 from ..jit import kernel
-from .base import BatchGuard, Games, game_of
+from .active_set import OPTIMAL, project
+from .base import BatchFilter, Games, game_of
 
 WAYS = 3
 """Ways an opponent may move in a step: straight on, and with full rudder to port and to starboard."""
@@ -67,12 +67,12 @@ def near_pairs(setup: Setup, state: Array, ours: BoolArray) -> IntArray:
     """
     pairs, m = np.zeros((setup.table.size, 4), np.int64), 0
     for i, j in np.ndindex(setup.table.shape):
-        mates = setup.team[i] == setup.team[j]
-        if i == j or not ours[i] or (mates and ours[j] and j < i):
+        teammates = setup.team[i] == setup.team[j]
+        if i == j or not ours[i] or (teammates and ours[j] and j < i):
             continue
         gap = math.hypot(state[j, L.X] - state[i, L.X], state[j, L.Y] - state[i, L.Y])
         if gap <= table_range_m(setup.tables, int(setup.table[i, j])):
-            first, last = (WAYS, WAYS + 1) if mates and ours[j] else (0, 1 if mates else WAYS)
+            first, last = (WAYS, WAYS + 1) if teammates and ours[j] else (0, 1 if teammates else WAYS)
             pairs[m, 0], pairs[m, 1], pairs[m, 2], pairs[m, 3] = i, j, first, last
             m += 1
     return pairs[:m]
@@ -172,75 +172,62 @@ def _effects(setup: Setup, i: int, state: Array, command: Array, later: Array, z
 @kernel
 def _rows(setup: Setup, pairs: IntArray, need_m: Array, x: Array, effect: Array, z: Array) -> tuple[Array, Array]:
     """Rows C z >= d, of unit length: of pairs V >= ``need_m`` (m,), and the limits of the inputs."""
-    C, d, r = np.zeros((WAYS * len(pairs) + 2 * len(z), len(z))), np.zeros(WAYS * len(pairs) + 2 * len(z)), 0
+    n, most_speed = len(z), math.sqrt(setup.speed_weight)
+    C, d, r = np.zeros((WAYS * len(pairs) + 2 * n, n)), np.zeros(WAYS * len(pairs) + 2 * n), 0
     for m in range(len(pairs)):
         i, j, first, last = pairs[m, 0], pairs[m, 1], pairs[m, 2], pairs[m, 3]
         for other in x[j, first:last]:
             slope = table_gradient(setup.tables, int(setup.table[i, j]), setup.fear_s, *seen(x[i, WAYS], other))
-            row = C[r]
-            for c in range(len(z)):
-                row[c] = 0.0
+            row, square, lack, most = C[r], 0.0, need_m[m] - slope.value_m, 0.0
+            row[:] = 0.0
             row[2 * i], row[2 * i + 1] = slope.own_heading * math.radians(effect[i, 0]), slope.own_speed * effect[i, 1]
             if first == WAYS:
-                row[2 * j], row[2 * j + 1] = (
-                    slope.other_heading * math.radians(effect[j, 0]),
-                    slope.other_speed * effect[j, 1],
-                )
-            square, lack, most = 0.0, need_m[m] - slope.value_m, 0.0
-            for c in range(len(z)):
-                square += row[c] * row[c]
-            length = math.sqrt(square)
+                row[2 * j] = slope.other_heading * math.radians(effect[j, 0])
+                row[2 * j + 1] = slope.other_speed * effect[j, 1]
             d[r] = lack
-            for c in range(len(z)):
+            for c in range(n):
+                square += row[c] * row[c]
                 d[r] += row[c] * z[c]
-                most += abs(row[c]) * (2.0 if c % 2 == 0 else math.sqrt(setup.speed_weight))
-            if length >= 1e-9 and lack + most >= 0.0:  # else no inputs can break or change it
+                most += abs(row[c]) * (2.0 if c % 2 == 0 else most_speed)
+            if square >= 1e-18 and lack + most >= 0.0:  # else no inputs can break or change it
+                length = math.sqrt(square)
                 d[r] /= length
-                for c in range(len(z)):
-                    row[c] /= length
+                row /= length
                 r += 1
-    for c in range(len(z)):
-        for k in range(len(z)):
-            C[r, k] = C[r + 1, k] = 0.0
+    C[r:] = 0.0
+    for c in range(n):
         C[r, c], C[r + 1, c] = 1.0, -1.0
-        d[r], d[r + 1] = (-1.0, -1.0) if c % 2 == 0 else (0.0, -math.sqrt(setup.speed_weight))
+        d[r], d[r + 1] = (-1.0, -1.0) if c % 2 == 0 else (0.0, -most_speed)
         r += 2
-    return C[:r, : len(z)], d[:r]
+    return C[:r], d[:r]
 
 
 @kernel
 def _program(setup: Setup, game: Games, pairs: IntArray, target: Array, asked: Array, h: Array) -> bool:
     """Write commands by the least change of the inputs, and the margins after them; whether all targets are kept."""
-    state, ours, sent, n = game.state, game.ours, game.sent, len(game.ours)
+    state, ours, filtered, n = game.state, np.flatnonzero(game.ours), game.filtered, len(game.ours)
     z0, z, now, effect = np.zeros(2 * n), np.zeros(2 * n), np.zeros(2 * n), np.zeros((n, 2))
-    need = np.zeros(len(target))
     for attempt in range(ROUNDS):
-        x = ahead(setup, state, ours, sent, 1)
-        for i in range(n):
-            if not ours[i]:
-                continue
-            found = _effects(setup, int(i), state[i], sent[i], x[i, WAYS], now[2 * i : 2 * i + 2])
-            effect[i, 0], effect[i, 1] = found
+        x = ahead(setup, state, game.ours, filtered, 1)
+        for i in ours:
+            turn_deg, gain = _effects(setup, int(i), state[i], filtered[i], x[i, WAYS], now[2 * i : 2 * i + 2])
+            effect[i, 0], effect[i, 1] = turn_deg, gain
         if attempt == 0:
             copy_row(z0, now)
-        for m in range(len(target)):
-            need[m] = setup.radius_m + target[m] + AIM_M
-        C, d = _rows(setup, pairs, need, x, effect, now)
+        C, d = _rows(setup, pairs, setup.radius_m + target + AIM_M, x, effect, now)
         if project(C, d, z0, z) != OPTIMAL:
             return False
-        for i in range(n):
-            if not ours[i]:
-                continue
-            copy_row(sent[i], asked[i])
-            if max(abs(z[2 * i] - z0[2 * i]), abs(z[2 * i + 1] - z0[2 * i + 1])) > SAME:
+        for i in ours:
+            copy_row(filtered[i], asked[i])
+            if np.abs(z - z0)[2 * i : 2 * i + 2].max() > SAME:
                 speed = clamp(z[2 * i + 1] / math.sqrt(setup.speed_weight), 0.0, 1.0) * setup.params[i, L.MAX_SPEED]
                 turn = z[2 * i] * effect[i, 0]
-                sent[i, 0], sent[i, 1] = speed, command_for_turn(setup.params[i], state[i], speed, turn, setup.dt_s)
-        copy_row(h, margins(setup, pairs, ahead(setup, state, ours, sent, 1)))
-        kept = True
-        for m in range(len(target)):
-            kept = kept and h[m] >= target[m]
-        if kept:
+                filtered[i, 0], filtered[i, 1] = (
+                    speed,
+                    command_for_turn(setup.params[i], state[i], speed, turn, setup.dt_s),
+                )
+        copy_row(h, margins(setup, pairs, ahead(setup, state, game.ours, filtered, 1)))
+        if (h >= target).all():
             return True
     return False
 
@@ -262,20 +249,12 @@ def _take_backups(setup: Setup, game: Games, pairs: IntArray, movers: BoolArray)
 
     A boat changes the side it turns to, which is kept of it, only for what is clearly better.
     """
-    state, sent, side = game.state, game.sent, game.memory[:, 0]
-    x = ahead(setup, state, game.ours, sent, setup.look)
+    state, filtered, side = game.state, game.filtered, game.memory[:, 0]
+    x = ahead(setup, state, game.ours, filtered, setup.look)
     for sweep in range(SWEEPS):
-        for i in range(len(movers)):
-            if not movers[i]:
-                continue
+        for i in np.flatnonzero(movers):
+            mine = pairs[(pairs[:, 0] == i) | ((pairs[:, 1] == i) & (pairs[:, 2] == WAYS))]
             best, chosen = -math.inf, 0
-            mine, many = np.empty_like(pairs), 0
-            for m in range(len(pairs)):
-                if pairs[m, 0] == i or (pairs[m, 1] == i and pairs[m, 2] == WAYS):
-                    for c in range(4):
-                        mine[many, c] = pairs[m, c]
-                    many += 1
-            mine = mine[:many]
             for k in range(len(BACKUPS)):
                 copy_row(x[i, WAYS], state[i])
                 _follow(setup, int(i), BACKUPS[k], x[i, WAYS])
@@ -286,69 +265,55 @@ def _take_backups(setup: Setup, game: Games, pairs: IntArray, movers: BoolArray)
                 if value > best:
                     best, chosen = value, k
             copy_row(x[i, WAYS], state[i])
-            speed, heading = _follow(setup, int(i), BACKUPS[chosen], x[i, WAYS])
+            command = _follow(setup, int(i), BACKUPS[chosen], x[i, WAYS])
             if sweep == SWEEPS - 1:
-                turn = BACKUPS[chosen, 0]
-                sent[i, 0], sent[i, 1] = speed, heading
-                side[i] = 1.0 if turn > 0.0 else (-1.0 if turn < 0.0 else 0.0)
+                filtered[i, 0], filtered[i, 1], side[i] = command[0], command[1], np.sign(BACKUPS[chosen, 0])
 
 
 @kernel
-def _short(pairs: IntArray, h: Array, target: Array, movers: BoolArray) -> bool:
-    """Add the boats that fall short of a target to the movers; whether there were any."""
-    left, more = h.copy(), False
-    for m in range(len(h)):
-        left[m] -= target[m]
-    low = least(pairs, left, len(movers))
-    for i in range(len(movers)):
-        if not movers[i] and not low[i] >= 0.0:
-            movers[i] = more = True
-    return more
+def _short(pairs: IntArray, left_m: Array, movers: BoolArray) -> bool:
+    """Add the boats whose pairs have less than nothing left of their targets to the movers; whether there were any."""
+    more = ~movers & ~(least(pairs, left_m, len(movers)) >= 0.0)
+    movers[:] = movers | more
+    return bool(more.any())
 
 
 @kernel
-def decide_game(setup: Setup, game: Games) -> None:  # noqa: C901 - copies of rows, in loops that compile quickly
+def decide_game(setup: Setup, game: Games) -> None:
     """Decide for the boats of ours in one game, (n, ...) each."""
-    state, wanted, ours, memory, sent, reason, safety_margin_m = game
+    state, nominal, ours, memory, filtered, reason, safety_margin_m = game
     n = len(ours)
     for i in range(n):
         reason[i] = PASSED if ours[i] else NOT_COVERED
-        if ours[i] and not (abs(wanted[i, 0]) <= LARGEST_COMMAND and abs(wanted[i, 1]) <= LARGEST_COMMAND):
-            sent[i, 0] = sent[i, 1] = 0.0
-            reason[i] = HELD
-    asked, pairs = sent.copy(), near_pairs(setup, state, ours)
-    target = margins(setup, pairs, ahead(setup, state, ours, sent, 0))
-    for m in range(len(target)):
-        target[m] = max(0.0, setup.decay * min(target[m], setup.cap_m))
-    h = margins(setup, pairs, ahead(setup, state, ours, sent, 1))
-    movers = np.zeros(n, np.bool_)
-    moved = _short(pairs, h, target, movers)
+        if ours[i] and not (abs(nominal[i, 0]) <= LARGEST_COMMAND and abs(nominal[i, 1]) <= LARGEST_COMMAND):
+            filtered[i, 0], filtered[i, 1], reason[i] = 0.0, 0.0, HELD
+    asked, pairs, movers = filtered.copy(), near_pairs(setup, state, ours), np.zeros(n, np.bool_)
+    now = margins(setup, pairs, ahead(setup, state, ours, filtered, 0))
+    target = np.maximum(0.0, setup.decay * np.minimum(now, setup.cap_m))
+    h = margins(setup, pairs, ahead(setup, state, ours, filtered, 1))
+    moved = _short(pairs, h - target, movers)
     if moved and _program(setup, game, pairs, target, asked, h):
+        movers[:] = False
         for i in range(n):
-            movers[i] = False
-            if ours[i] and (sent[i, 0] != asked[i, 0] or sent[i, 1] != asked[i, 1]):
+            if ours[i] and (filtered[i, 0] != asked[i, 0] or filtered[i, 1] != asked[i, 1]):
                 reason[i] = LEAST_CHANGE
     elif moved:
-        for i in range(n):
-            copy_row(sent[i], asked[i])
+        filtered[:] = asked
         while moved:  # who falls short by what others do now backs away, too
             _take_backups(setup, game, pairs, movers)
-            copy_row(h, margins(setup, pairs, ahead(setup, state, ours, sent, 1)))
-            moved = _short(pairs, h, target, movers)
+            copy_row(h, margins(setup, pairs, ahead(setup, state, ours, filtered, 1)))
+            moved = _short(pairs, h - target, movers)
     copy_row(safety_margin_m, least(pairs, h, n))
     for i in range(n):
-        if not ours[i]:
-            continue
-        if movers[i]:
+        if ours[i] and movers[i]:
             reason[i] = BACKUP if safety_margin_m[i] >= 0.0 else BEST_EFFORT
-        elif reason[i] != LEAST_CHANGE:
-            for c in range(memory.shape[1]):
-                memory[i, c] = 0.0
+        elif ours[i] and reason[i] != LEAST_CHANGE:
+            memory[i] = 0.0
 
 
 @kernel
 def decide_games(setup: Setup, games: Games) -> None:
-    """`decide_game` for every game; arrays carry a leading games axis."""
+    """`decide_game` for every game."""
     for b in range(len(games.state)):
         decide_game(setup, game_of(games, b))
 
@@ -358,20 +323,8 @@ SETTINGS = ("cbf_rate_per_s", "margin_cap_m", "speed_weight", "adversary_horizon
 """Settings of `ShieldConfig` that may be given with the name; separation, position error and step count too."""
 
 
-def check_settings(settings: dict[str, Any]) -> None:
-    """Check settings given with the name.
-
-    Raises:
-        ConfigError: one that this guard has no use for, or a bad value.
-    """
-    for key in settings:
-        if key not in SETTINGS:
-            raise ConfigError(f"guard {NAME!r} has no setting {key!r}; it knows {', '.join(SETTINGS)}")
-    ShieldConfig.of(**settings)
-
-
-class ReachGuard(BatchGuard):
-    """Commands kept where the value tables promise the separation; what is not said here is as in `BatchGuard`.
+class ReachFilter(BatchFilter):
+    """Commands kept where the value tables promise the separation; what is not said here is as in `BatchFilter`.
 
     Reasons are the shield's: 0 passed bit for bit, 1 changed by the program, 3 backup, 4 best effort (no rudder and no
     braking keeps the separation), 5 no usable command, so the boat holds, 6 not decided for. ``safety_margin_m`` is the
@@ -384,6 +337,18 @@ class ReachGuard(BatchGuard):
     """
 
     columns, needs_commands = 1, False
+
+    @staticmethod
+    def check_settings(settings: dict[str, Any]) -> None:
+        """Check settings given with the name.
+
+        Raises:
+            ConfigError: one that this filter has no use for, or a bad value.
+        """
+        for key in settings:
+            if key not in SETTINGS:
+                raise ConfigError(f"filter {NAME!r} has no setting {key!r}; it knows {', '.join(SETTINGS)}")
+        ShieldConfig.of(**settings)
 
     def __init__(
         self, config: ShieldConfig, games: int, platforms: tuple[str | Platform, ...], team: tuple[int, ...]
@@ -424,6 +389,6 @@ def _tables(platforms: list[Platform], team: tuple[int, ...]) -> tuple[list[Valu
         try:
             found.setdefault(key, load_table(*key))
         except TableError as error:
-            raise ConfigError(f"guard {NAME!r}: {error}") from error
+            raise ConfigError(f"filter {NAME!r}: {error}") from error
         index[i, j] = list(found).index(key)
     return list(found.values()), index

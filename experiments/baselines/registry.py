@@ -1,11 +1,11 @@
-"""Safety filters by name, as ``--guard`` takes them: ``none``, ``shield``, ``reach``, by rollouts, textbook filters."""
+"""Safety filters by name, as ``--filter`` takes them: the shield, and those of the literature."""
 
 from __future__ import annotations
 
 import json
 import re
 from collections.abc import Callable
-from functools import cache, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
@@ -14,6 +14,12 @@ from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array, BoolArray, IntArray
 from steerclear.shield.surroundings import OPEN_WATER, Surroundings
+
+from .barriers import BARRIERS
+from .plcbf import PolicyLibrary
+from .reach import ReachFilter
+from .rollouts import Gatekeeper
+from .textbook import TextbookFilter
 
 if TYPE_CHECKING:
     from ..encounters.scene import Conditions, Scenes
@@ -29,7 +35,7 @@ GIVEN = {
 """Settings that the conditions of a run decide."""
 
 
-class Guard(Protocol):
+class SafetyFilter(Protocol):
     """What filters the commands of a batch of games; the batched shield is one."""
 
     @property
@@ -42,106 +48,87 @@ class Guard(Protocol):
         """(B, n) margin left, m, of the last decision; inf where nobody is near."""
         ...
 
-    def decide(self, state: Array, wanted: Array, ours: BoolArray) -> Array:
+    def decide(self, state: Array, nominal: Array, ours: BoolArray) -> Array:
         """Commands (B, n, 2), speed m/s and relative heading deg, for the boats of ``ours`` (B, n)."""
         ...
 
 
-GuardMaker = Callable[[ShieldConfig, int, tuple[str, ...], tuple[int, ...], Surroundings], Guard]
-"""From settings, games, platforms, teams and static constraints to a guard."""
+FilterMaker = Callable[[ShieldConfig, int, tuple[str, ...], tuple[int, ...], Surroundings], SafetyFilter]
+"""From settings, games, platforms, teams and static constraints to a safety filter."""
 
 
-class NoGuard:
+class NoFilter:
     """Passes every command."""
 
     def __init__(self, games: int, boats: int) -> None:
         self.reason = np.zeros((games, boats), np.int64)
         self.safety_margin_m = np.full((games, boats), np.inf)
 
-    def decide(self, state: Array, wanted: Array, ours: BoolArray) -> Array:
+    def decide(self, state: Array, nominal: Array, ours: BoolArray) -> Array:
         """The nominal commands themselves."""
-        return wanted
+        return nominal
 
 
 class Entry(NamedTuple):
-    """A filter that has a name.
+    """A filter that has a name: made from what a `FilterMaker` takes and the settings given with the name.
 
-    Attributes:
-        make: from what a `GuardMaker` takes, and the settings given with the name, to the filter.
-        check: refuses settings; None: it takes none.
-        of_config: whether its settings are those of `ShieldConfig`.
+    ``check`` refuses settings (None: it takes none); ``of_config``: they are those of `ShieldConfig`.
     """
 
-    make: Callable[..., Guard]
+    make: Callable[..., SafetyFilter]
     check: Callable[[dict[str, Any]], object] | None = None
     of_config: bool = False
 
 
-@cache
-def filters() -> dict[str, Entry]:
-    """Every filter, by name: an entry here makes one an option of ``--guard``."""
-    from . import gatekeeper, plcbf, reach, rollouts, textbook
-
-    by_rollouts = {
-        rollouts.GATEKEEPER: gatekeeper.Gatekeeper,
-        rollouts.GATEKEEPER_WORST: gatekeeper.Gatekeeper,
-        rollouts.PL_CBF: plcbf.PolicyLibrary,
-    }
-    return {
-        NONE: Entry(lambda config, games, platforms, team, around, settings: NoGuard(games, len(team))),
-        SHIELD: Entry(lambda *fleet: BatchedShield(*fleet[:5]), lambda given: ShieldConfig.of(**given), True),
-        REACH: Entry(lambda *fleet: reach.ReachGuard(*fleet[:4]), reach.check_settings, True),
-        **{
-            name: Entry(
-                lambda *fleet, name=name, kind=kind: kind(name, *fleet[:4], fleet[5]),
-                partial(rollouts.read_settings, name, kind.kind),
-            )
-            for name, kind in by_rollouts.items()
-        },
-        **{name: Entry(lambda *fleet, name=name: textbook.TextbookGuard(name, *fleet[:4])) for name in textbook.NAMES},
-    }
+def _rollouts(kind: Any, name: str) -> Entry:
+    return Entry(lambda *fleet: kind(name, *fleet[:4], fleet[5]), partial(kind.read_settings, name))
 
 
-def parse_guards(text: str) -> list[str]:
-    """Split names of guards at commas; ``shield:a=1,b=2,none`` is two: a piece ``b=2`` belongs to what is before.
+FILTERS: dict[str, Entry] = {
+    NONE: Entry(lambda config, games, platforms, team, around, settings: NoFilter(games, len(team))),
+    SHIELD: Entry(lambda *fleet: BatchedShield(*fleet[:5]), lambda given: ShieldConfig.of(**given), True),
+    REACH: Entry(lambda *fleet: ReachFilter(*fleet[:4]), ReachFilter.check_settings, True),
+    **{name: _rollouts(Gatekeeper, name) for name in ("gatekeeper", "gatekeeper-worst")},
+    "pl-cbf": _rollouts(PolicyLibrary, "pl-cbf"),
+    **{name: Entry(lambda *fleet, name=name: TextbookFilter(name, *fleet[:4])) for name in BARRIERS},
+}
+"""Every filter, by name: an entry here makes one a value of ``--filter``."""
+
+
+def parse_filters(text: str) -> list[str]:
+    """Split names of filters at commas; ``shield:a=1,b=2,none`` is two: a piece ``b=2`` belongs to what is before.
 
     Raises:
         ConfigError: no name, one that is not known, or settings that it refuses.
     """
-    names: list[str] = []
-    for piece in filter(None, (part.strip() for part in text.split(","))):
-        if names and re.fullmatch(r"\w+=.*", piece):
-            names[-1] += f",{piece}"
-        else:
-            names.append(piece)
+    names = [piece for piece in re.split(r",(?!\w+=)", "".join(text.split())) if piece]
     if not names:
-        raise ConfigError("--guard names no guard; give none, shield, or one of the filters of the literature")
+        raise ConfigError("--filter names no safety filter; give none, shield, or one of those of the literature")
     for name in names:
-        check_guard(name)
+        check_filter(name)
     return names
 
 
-def check_guard(name: str) -> None:
-    """Check a guard's name and settings.
+def check_filter(name: str) -> None:
+    """Check a filter's name and settings.
 
     Raises:
-        ConfigError: see `parse_guards`.
+        ConfigError: see `parse_filters`.
     """
     base, settings = split_name(name)
-    known = filters()
-    if base not in known:
-        raise ConfigError(f"unknown guard {base!r}; choose from {', '.join(known)}")
-    check = known[base].check
+    if base not in FILTERS:
+        raise ConfigError(f"unknown safety filter {base!r}; choose from {', '.join(FILTERS)}")
+    check = FILTERS[base].check
     if check is not None:
         check(settings)
     elif settings:
-        names = ", ".join(one for one, entry in known.items() if entry.check)
+        names = ", ".join(one for one, entry in FILTERS.items() if entry.check)
         raise ConfigError(f"{base!r} takes no settings; only {names} do, as in shield:KEY=VALUE,...")
 
 
-def is_shield(guard: str) -> bool:
-    """Whether a guard is the shield, with whatever settings."""
-    return guard.partition(":")[0] == SHIELD
+def is_shield(name: str) -> bool:
+    """Whether a filter is the shield, with whatever settings."""
+    return name.partition(":")[0] == SHIELD
 
 
 def split_name(name: str) -> tuple[str, dict[str, Any]]:
@@ -155,9 +142,9 @@ def split_name(name: str) -> tuple[str, dict[str, Any]]:
     for piece in filter(None, rest.split(",")):
         key, equals, value = piece.partition("=")
         if not equals:
-            raise ConfigError(f"{piece!r} in guard {name!r} has no value; write {base}:KEY=VALUE,...")
+            raise ConfigError(f"{piece!r} in filter {name!r} has no value; write {base}:KEY=VALUE,...")
         if key in GIVEN:
-            raise ConfigError(f"{key} of guard {name!r} follows from the run; set it with {GIVEN[key]}")
+            raise ConfigError(f"{key} of filter {name!r} follows from the run; set it with {GIVEN[key]}")
         try:
             settings[key] = json.loads(value)
         except json.JSONDecodeError:
@@ -165,29 +152,23 @@ def split_name(name: str) -> tuple[str, dict[str, Any]]:
     return base, settings
 
 
-def build_guard(guard: str | GuardMaker, scenes: Scenes, conditions: Conditions) -> Guard:
-    """Make the guard for a batch of scenes.
-
-    Args:
-        guard: a name, or what makes one.
-        scenes: games, fleet and field.
-        conditions: become settings: radius, position error, delay, speed of the current.
+def build_filter(guard: str | FilterMaker, scenes: Scenes, conditions: Conditions) -> SafetyFilter:
+    """Make the filter of a name, or by what makes one, for a batch of scenes; the conditions become settings.
 
     Raises:
-        ConfigError: an unknown name, or a guard that cannot honour the conditions.
+        ConfigError: an unknown name, or a filter that cannot honour the conditions.
     """
     base, settings = split_name(guard) if isinstance(guard, str) else ("", {})
     if isinstance(guard, str):
-        check_guard(guard)
-    of_config = not base or filters()[base].of_config
+        check_filter(guard)
     config = ShieldConfig.of(
         separation_m=conditions.radius_m,
         position_error_m=conditions.noise_m,
         delay_s=conditions.delay_s,
         current_mps=conditions.current_mps,
         dt_s=scenes.dt_s,
-        **(settings if of_config else {}),
+        **(settings if not base or FILTERS[base].of_config else {}),
     )
     around = OPEN_WATER if scenes.field is None else Surroundings(field=scenes.field)
     fleet = (config, scenes.games, scenes.platforms, tuple(scenes.team.tolist()), around)
-    return guard(*fleet) if callable(guard) else filters()[base].make(*fleet, settings)
+    return guard(*fleet) if callable(guard) else FILTERS[base].make(*fleet, settings)

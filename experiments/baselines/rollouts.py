@@ -1,15 +1,34 @@
-"""What filters that try manoeuvres out on the boat's own model share: plans, predictions, clearances. Compiled.
+"""Filters that try manoeuvres out on the boat's own model: what they share, and gatekeeper. Compiled.
 
 A plan of a boat is one row: steps left of its first command, speed m/s and heading deg of that command, speed and
 heading of the command after it. Headings are absolute, so that a plan means the same trajectory one step on.
+
+gatekeeper: the nominal command for as long as possible, then a backup that is known to be safe. Source: Agrawal, Chen,
+Panagou, "gatekeeper: Online Safety Verification and Control for Nonlinear Systems in Dynamic Environments" (T-RO 2024,
+arXiv 2211.14361), and the search over switching times of several agents of arXiv 2604.02401. In their words: a
+*candidate* trajectory follows the nominal one for T_S and the backup controller for T_B after it; it is *valid* when it
+stays in the safe set all the way and ends in the backup set; the valid one with the greatest T_S is *committed*, and
+where there is none the committed one goes on. An agent holds the others' committed trajectories for what they will do,
+and plans while they do not.
+
+What the papers leave to the user, and what stands here:
+
+| left open | here |
+| --- | --- |
+| nominal trajectory | the nominal command held, speed and absolute heading: a filter is not told a policy's plans |
+| backup controller | the manoeuvre of the library with the greatest least clearance |
+| model | the boat's hull and autopilot, step by step: what is committed is what the boat does |
+| backup set | nobody comes within the radius, ever, if from the end on every boat holds its course |
+| others | opponents hold course and speed; or fill the disc they can reach (then the backup set is not asked for) |
+| the first committed trajectory | to stop on the present heading |
+| who plans when | teammates one after the other within a step, in the order of their numbers |
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from steerclear.shield.config import ShieldConfig
@@ -21,103 +40,24 @@ from steerclear.shield.platforms.step import step_boat
 from steerclear.shield.platforms.usv import wrap_degrees
 
 from ..jit import kernel
-from .base import BatchGuard
+from .base import BatchFilter, Games, game_of
 from .unicycle import input_limits
 
-GATEKEEPER, GATEKEEPER_WORST, PL_CBF = "gatekeeper", "gatekeeper-worst", "pl-cbf"
 TURNS_DEG = (30.0, 60.0, 90.0, 130.0, 170.0)
 """Turns of the library, to port and to starboard at top speed, deg from the present heading."""
 HOLD_SPEED = -1.0
 """Speed share that stands for the present speed."""
+LIBRARY = np.array([(0.0, HOLD_SPEED), *((side * turn, 1.0) for turn in TURNS_DEG for side in (-1.0, 1.0)), (0.0, 0.0)])
+"""(M, 2) turn deg and share of top speed of each manoeuvre: hold, turns to either side, stop."""
 SWITCH_SHARES = (1.0, 0.5, 0.25, 0.125)
 """Switching times that are tried, as shares of the longest; then one step, then none."""
 AREA, NEAREST = 0, 1
 PICKS = {"area": AREA, "nearest": NEAREST}
-STEP_S = 0.1
-"""Step that settings are checked with while no run's is known, s."""
 MOST = {"horizon_s": 60.0, "switch_s": 30.0, "alpha_per_s": 10.0}
-
-
 N_PLAN = 5
 NO_PLAN = -1.0
 """Steps left of a boat that has not decided yet."""
-
-
-@dataclass(frozen=True)
-class GatekeeperSettings:
-    """How far gatekeeper looks.
-
-    Attributes:
-        horizon_s: length of the backup, s, T_B of the paper.
-        switch_s: longest switching time that is tried, s, T_H of the paper.
-    """
-
-    horizon_s: float = 8.0
-    switch_s: float = 4.0
-
-
-@dataclass(frozen=True)
-class LibrarySettings:
-    """How PL-CBF looks and chooses.
-
-    Attributes:
-        horizon_s: length of a rollout, s, T of the paper.
-        alpha_per_s: rate of the row dV/dt >= -alpha V.
-        pick: safe mode taken: ``area`` the one that leaves the largest part of the inputs, as the authors' published
-            code does, ``nearest`` the one whose program changes the wanted inputs least.
-    """
-
-    horizon_s: float = 10.0
-    alpha_per_s: float = 1.0
-    pick: str = "area"
-
-
-Settings = GatekeeperSettings | LibrarySettings
-
-
-def read_settings(name: str, kind: type[Settings], given: Mapping[str, Any], dt_s: float = STEP_S) -> Settings:
-    """Make settings of what was given with a guard's name.
-
-    Args:
-        name: of the guard, for messages.
-        kind: class of its settings.
-        given: values by key.
-        dt_s: step, s; no time may be shorter.
-
-    Raises:
-        ConfigError: an unknown key, or a value out of bounds.
-    """
-    known = [field.name for field in fields(kind)]
-    for key, value in given.items():
-        if key not in known:
-            raise ConfigError(f"guard {name!r} has no setting {key!r}; it knows {', '.join(known)}")
-        _check_value(name, key, value, dt_s)
-    return kind(**given)
-
-
-def _check_value(name: str, key: str, value: Any, dt_s: float) -> None:
-    if key == "pick":
-        if value not in tuple(PICKS):
-            raise ConfigError(f"pick of guard {name!r} is {value!r}; choose {' or '.join(PICKS)}")
-        return
-    least = dt_s if key.endswith("_s") and not key.endswith("_per_s") else 0.0
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if not number or not least <= value <= MOST[key] or value == 0.0:
-        low = f"at least {least:g}" if least else "above 0"
-        raise ConfigError(f"{key} of guard {name!r} is {value!r}; give a number {low}, at most {MOST[key]:g}")
-
-
-def library() -> Array:
-    """(M, 2) turn deg and share of top speed of each manoeuvre: hold, turns to either side, stop."""
-    turns = [(side * turn, 1.0) for turn in TURNS_DEG for side in (-1.0, 1.0)]
-    return np.array([(0.0, HOLD_SPEED), *turns, (0.0, 0.0)])
-
-
-def switch_steps(longest_s: float, dt_s: float) -> IntArray:
-    """Switching times in steps, longest first, down to one step and none."""
-    longest = max(1, math.floor(longest_s / dt_s + 1e-9))
-    tried = {max(1, round(share * longest)) for share in SWITCH_SHARES} | {1, 0}
-    return np.array(sorted(tried, reverse=True), dtype=np.int64)
+PASSED, BACKUP, GOES_ON = 0, 1, 2
 
 
 class Setup(NamedTuple):
@@ -176,24 +116,20 @@ def roll_plan(setup: Setup, j: int, state: Array, plan: Array, path: Array) -> N
 
 
 @kernel
-def predict_other(setup: Setup, state: Array, path: Array) -> None:
-    """Write the places (K, 2) of an opponent: on its course, or at the centre of the disc it can reach."""
-    course = math.radians(state[L.HEADING])
-    speed = 0.0 if setup.worst else state[L.SPEED]
-    for k in range(path.shape[0]):
-        path[k, 0] = state[L.X] + k * setup.dt_s * speed * math.sin(course)
-        path[k, 1] = state[L.Y] + k * setup.dt_s * speed * math.cos(course)
-
-
-@kernel
 def predict_all(setup: Setup, state: Array, ours: BoolArray, plan: Array, path: Array, grow: Array) -> None:
-    """Places (n, K, 2) of all boats and growth (n,), m/s, of the discs around them."""
+    """Places (n, K, 2) of all boats and growth (n,), m/s, of the discs around them.
+
+    An opponent is on its course, or at the centre of the disc it can reach.
+    """
     for j in range(state.shape[0]):
         grow[j] = 0.0
         if ours[j]:
             roll_plan(setup, j, state[j], plan[j], path[j])
             continue
-        predict_other(setup, state[j], path[j])
+        course, speed = math.radians(state[j, L.HEADING]), 0.0 if setup.worst else state[j, L.SPEED]
+        for k in range(path.shape[1]):
+            path[j, k, 0] = state[j, L.X] + k * setup.dt_s * speed * math.sin(course)
+            path[j, k, 1] = state[j, L.Y] + k * setup.dt_s * speed * math.cos(course)
         if setup.worst:
             grow[j] = setup.limits[j, 0]
 
@@ -238,28 +174,18 @@ def gap_after(setup: Setup, around: Around, k: int, row: Array) -> float:
     return least - setup.radius_m
 
 
-class RolloutGuard(BatchGuard):
+class RolloutFilter(BatchFilter):
     """Commands of B games of the same fleet, filtered by manoeuvres that are rolled out.
 
     Reasons: 0 passed bit for bit, 1 changed (gatekeeper: the backup begins now), 2 gatekeeper: no candidate is valid
     and the committed trajectory goes on; PL-CBF: its program has no answer and the boat follows the mode taken.
     ``safety_margin_m`` is the least clearance of what is committed, or the value of the mode taken, m; inf where nobody
-    is within reach. Fixed things and the field's edge are not kept clear of.
-
-    Args:
-        name: of the filter.
-        config: settings; separation, buffer, position error and step are used.
-        games: number of games B.
-        platforms: platforms of the n boats.
-        team: team of the n boats.
-        settings: of the filter, by key.
-
-    Raises:
-        ConfigError: unknown setting, a fleet that does not fit, or a delay, which these filters know nothing of.
+    is within reach. Fixed things and the field's edge are not kept clear of. What is not said here is as in
+    `BatchFilter`; ``settings`` are the filter's own, by key.
     """
 
     columns, forgotten = N_PLAN, NO_PLAN
-    kind: type[Settings]
+    defaults: ClassVar[dict[str, Any]]
 
     def __init__(
         self,
@@ -270,19 +196,128 @@ class RolloutGuard(BatchGuard):
         team: tuple[int, ...],
         settings: Mapping[str, Any] | None = None,
     ) -> None:
-        read, dt_s = read_settings(name, self.kind, settings or {}, config.dt_s), config.dt_s
+        dt_s = config.dt_s
+        read = self.read_settings(name, settings or {}, dt_s)
         super().__init__(name, config, games, platforms, team)
-        library_s = read if isinstance(read, LibrarySettings) else LibrarySettings()
+        longest = max(1, math.floor(read.get("switch_s", dt_s) / dt_s + 1e-9))
+        switches = {max(1, round(share * longest)) for share in SWITCH_SHARES} | {1, 0}
         self._setup = Setup(
             params=self.params,
             limits=np.array([input_limits(kind, dt_s) for kind in self._platforms]),
-            team=np.array(team, dtype=np.int64),
-            library=library(),
-            switches=switch_steps(read.switch_s if isinstance(read, GatekeeperSettings) else dt_s, dt_s),
-            steps=max(1, round(read.horizon_s / dt_s)),
+            team=self.team,
+            library=LIBRARY,
+            switches=np.array(sorted(switches, reverse=True), dtype=np.int64),
+            steps=max(1, round(read["horizon_s"] / dt_s)),
             radius_m=self.radius_m,
             dt_s=dt_s,
-            worst=name == GATEKEEPER_WORST,
-            alpha_per_s=library_s.alpha_per_s,
-            pick=PICKS[library_s.pick],
+            worst=name == "gatekeeper-worst",
+            alpha_per_s=read.get("alpha_per_s", 1.0),
+            pick=PICKS[read.get("pick", "area")],
         )
+
+    @classmethod
+    def read_settings(cls, name: str, given: Mapping[str, Any], dt_s: float = 0.1) -> dict[str, Any]:
+        """Settings of what was given with a filter's name; no time may be shorter than a step.
+
+        Raises:
+            ConfigError: an unknown key, or a value out of bounds.
+        """
+        for key, value in given.items():
+            if key not in cls.defaults:
+                raise ConfigError(f"filter {name!r} has no setting {key!r}; it knows {', '.join(cls.defaults)}")
+            if key == "pick":
+                if value not in [*PICKS]:
+                    raise ConfigError(f"pick of filter {name!r} is {value!r}; choose {' or '.join(PICKS)}")
+                continue
+            least = 0.0 if key == "alpha_per_s" else dt_s
+            number = isinstance(value, (int, float)) and not isinstance(value, bool)
+            if not number or not least <= value <= MOST[key] or value == 0.0:
+                low = f"at least {least:g}" if least else "above 0"
+                raise ConfigError(f"{key} of filter {name!r} is {value!r}; give a number {low}, at most {MOST[key]:g}")
+        return {**cls.defaults, **given}
+
+
+@kernel
+def backup_value(setup: Setup, i: int, start: Array, k: int, m: int, around: Around, floor_m: float) -> float:
+    """Least clearance, m, of manoeuvre m begun at step k in the state ``start``; -inf once it is below ``floor_m``."""
+    speed, heading = command_of(setup, i, m, start)
+    row, least = start.copy(), math.inf
+    for t in range(1, setup.steps + 1):
+        advance(setup, i, row, speed, heading)
+        least = min(least, gap_at(setup, around, k + t, row[L.X], row[L.Y]))
+        if not least >= floor_m:
+            return -math.inf
+    if not setup.worst:
+        least = min(least, gap_after(setup, around, k + setup.steps, row))
+    return least if least >= floor_m else -math.inf
+
+
+@kernel
+def _decide_boat(setup: Setup, i: int, state: Array, around: Around, plan: Array, filtered: Array) -> tuple[int, float]:
+    """Commit to the valid candidate that switches last, or go on; returns why, and the least clearance of that, m."""
+    speed, heading = filtered[0], wrap_degrees(state[L.HEADING] + filtered[1])
+    trail, least_m = np.empty((setup.switches[0] + 1, L.N_STATE)), np.empty(setup.switches[0] + 1)
+    trail[0], least_m[0] = state, gap_at(setup, around, 0, state[L.X], state[L.Y])
+    for k in range(1, trail.shape[0]):
+        trail[k] = trail[k - 1]
+        advance(setup, i, trail[k], speed, heading)
+        least_m[k] = min(least_m[k - 1], gap_at(setup, around, k, trail[k, L.X], trail[k, L.Y]))
+    reason, value = GOES_ON, least_m[0]
+    for s in setup.switches:
+        best, best_m = -math.inf, -1
+        if least_m[s] >= 0.0:
+            for m in range(setup.library.shape[0]):
+                clear_m = backup_value(setup, i, trail[s], s, m, around, max(0.0, best))
+                if clear_m > best:
+                    best, best_m = clear_m, m
+        if best_m >= 0:
+            plan[0], plan[1], plan[2] = s, speed, heading
+            plan[3], plan[4] = command_of(setup, i, best_m, trail[s])
+            reason, value = PASSED if s > 0 else BACKUP, min(best, least_m[s])
+            break
+    if reason != PASSED:
+        first = 1 if plan[0] >= 1.0 else 3
+        filtered[0], filtered[1] = plan[first], wrap_degrees(plan[first + 1] - state[L.HEADING])
+    return reason, value
+
+
+@kernel
+def decide_game(setup: Setup, game: Games) -> None:
+    """Decide for the boats of ours, one after the other; ``filtered`` starts as the nominal commands."""
+    state, _, ours, plan, filtered, reason, clear_m = game
+    n, steps = state.shape[0], setup.switches[0] + setup.steps
+    path, grow, near = np.empty((n, steps + 1, 2)), np.empty(n), np.empty(n, np.bool_)
+    around = Around(near, path, grow)
+    for i in range(n):
+        if ours[i] and plan[i, 0] == NO_PLAN:
+            plan[i, 0], plan[i, 1], plan[i, 2] = 0.0, 0.0, state[i, L.HEADING]
+            plan[i, 3], plan[i, 4] = 0.0, state[i, L.HEADING]
+    predict_all(setup, state, ours, plan, path, grow)
+    for i in range(n):
+        if not ours[i]:
+            continue
+        mark_near(setup, i, state, steps, near)
+        reason[i], clear_m[i] = _decide_boat(setup, i, state[i], around, plan[i], filtered[i])
+        roll_plan(setup, i, state[i], plan[i], path[i])
+    for i in range(n):
+        if ours[i] and plan[i, 0] >= 1.0:
+            plan[i, 0] -= 1.0
+
+
+@kernel
+def decide_games(setup: Setup, games: Games) -> None:
+    """`decide_game` for every game; the memory is the boats' plans."""
+    for b in range(len(games.state)):
+        decide_game(setup, game_of(games, b))
+
+
+class Gatekeeper(RolloutFilter):
+    """gatekeeper; ``gatekeeper-worst`` takes opponents to fill the disc they can reach at top speed.
+
+    Settings: ``horizon_s``, length of the backup (T_B of the paper), and ``switch_s``, longest switching time (T_H).
+    """
+
+    defaults: ClassVar[dict[str, Any]] = {"horizon_s": 8.0, "switch_s": 4.0}
+
+    def _decide(self, games: Games) -> None:
+        decide_games(self._setup, games)

@@ -1,4 +1,4 @@
-"""`TextbookGuard`: a barrier of the literature in the place where the shield stands, and the loop that all share.
+"""`TextbookFilter`: a barrier of the literature in the place where the shield stands, and the loop that all share.
 
 Every boat of ours has two inputs z: its velocity (east, north, m/s), or those of `unicycle`. Others keep theirs; two
 boats of ours both answer their row. With B z what inputs do to velocities, a pair's row dh/dt >= -alpha h reads
@@ -11,7 +11,8 @@ and of velocities as inputs, with v_j of a boat that is not ours, <dh/dp, z_j or
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
+from warnings import warn
 
 import numpy as np
 from steerclear.shield.config import ShieldConfig
@@ -23,15 +24,15 @@ from steerclear.shield.platforms.usv import clamp, wrap_degrees
 
 from ..jit import kernel
 from .barriers import BARRIERS, Barrier, Gains, dot
-from .base import BatchGuard, Games, game_of
+from .base import BatchFilter, Games, game_of
 from .unicycle import SOLVED, UNSOLVED, command_of_inputs, holds, input_limits, inputs_of_command, solve
 
-__all__ = ["BARRIERS", "NAMES", "Barrier", "TextbookGuard"]
+__all__ = ["BARRIERS", "NAMES", "Barrier", "TextbookFilter"]
 NAMES = tuple(BARRIERS)
 FACETS = 16
-"""Sides of the polygon within the disc of speeds; one corner lies in the wanted direction."""
+"""Sides of the polygon within the disc of speeds; one corner lies in the nominal direction."""
 SAME = 1e-9
-"""Inputs this near to the wanted ones are the wanted ones."""
+"""Inputs this near to the nominal ones are the nominal ones."""
 
 
 class Setup(NamedTuple):
@@ -43,24 +44,24 @@ class Setup(NamedTuple):
     limits: Array
 
 
-class TextbookGuard(BatchGuard):
-    """Commands filtered as the literature does; what is not said here is as in `BatchGuard`.
+class TextbookFilter(BatchFilter):
+    """Commands filtered as the literature does; what is not said here is as in `BatchFilter`.
 
     Reasons: 0 passed bit for bit, 1 changed, 2 the program had no answer and was relaxed (the command may then be
-    the wanted one, where no input helps), 3 not even the relaxed program was solved: the boat is told to stop.
-    ``safety_margin_m`` is the distance to the nearest boat less the radius kept, m.
-
-    Args:
-        name: one of `NAMES`.
-        config: settings; separation, buffer, position error and step are used.
-        games: number of games B.
-        platforms: platforms of the n boats.
-        team: team of the n boats.
-        gains: gains for all boats; None takes those of each platform.
+    the nominal one, where no input helps), 3 not even the relaxed program was solved: the boat is told to stop.
+    ``safety_margin_m`` is the distance to the nearest boat less the radius kept, m. ``gains`` are for all boats; None
+    takes those of each platform.
     """
 
-    def __init__(self, name: str, config: ShieldConfig, games: int, platforms: tuple[str | Platform, ...],
-                 team: tuple[int, ...], gains: Gains | None = None) -> None:  # fmt: skip
+    def __init__(
+        self,
+        name: str,
+        config: ShieldConfig,
+        games: int,
+        platforms: tuple[str | Platform, ...],
+        team: tuple[int, ...],
+        gains: Gains | None = None,
+    ) -> None:
         if name not in BARRIERS:
             raise ConfigError(f"unknown filter {name!r}; choose one of {', '.join(NAMES)}")
         it = BARRIERS[name]
@@ -107,9 +108,9 @@ def headings(state: Array) -> Array:
 
 @kernel
 def _inputs(
-    setup: Setup, i: int, state: Array, wanted: Array, z: Array, B: Array, box: Array, C: Array, d: Array
+    setup: Setup, i: int, state: Array, nominal: Array, z: Array, B: Array, box: Array, C: Array, d: Array
 ) -> float:
-    """Write boat i's wanted inputs z (2,), B (2, 4), least and greatest z (2, 2), and limits C z >= d.
+    """Write boat i's nominal inputs z (2,), B (2, 4), least and greatest z (2, 2), and limits C z >= d.
 
     What an input does to the velocity is B[:2] times B[2] times B[3].
 
@@ -118,14 +119,14 @@ def _inputs(
     """
     top, ahead, B[:] = setup.limits[i, 0], math.radians(state[L.HEADING]), 1.0
     if setup.of_velocity:
-        speed, course = clamp(wanted[0], 0.0, top), math.radians(state[L.HEADING] + wanted[1])
+        speed, course = clamp(nominal[0], 0.0, top), math.radians(state[L.HEADING] + nominal[1])
         z[0], z[1], B[0, 1], B[1, 0] = speed * math.sin(course), speed * math.cos(course), 0.0, 0.0
         box[:, 0], box[:, 1] = -top, top
         for k in range(FACETS):
             side = course + (2 * k + 1) * math.pi / FACETS
             C[k, 0], C[k, 1], d[k] = -math.sin(side), -math.cos(side), -top * math.cos(math.pi / FACETS)
         return 0.0
-    most = inputs_of_command(setup.params[i], setup.limits[i], state, wanted, setup.dt_s, z, box)
+    most = inputs_of_command(setup.params[i], setup.limits[i], state, nominal, setup.dt_s, z, box)
     B[0, 0], B[0, 1], B[0, 3] = math.sin(ahead), math.cos(ahead), setup.limits[i, 2]
     B[1, 0], B[1, 1], B[1, 2], B[1, 3] = math.cos(ahead), -math.sin(ahead), state[L.SPEED], most
     C[0, 0], C[1, 0], C[2, 1], C[3, 1] = 1.0, -1.0, 1.0, -1.0
@@ -134,13 +135,13 @@ def _inputs(
 
 
 @kernel
-def _command(setup: Setup, i: int, state: Array, wanted: Array, z: Array, most_radps: float) -> tuple[float, float]:
+def _command(setup: Setup, i: int, state: Array, nominal: Array, z: Array, most_radps: float) -> tuple[float, float]:
     """Speed and relative heading of boat i that yield its inputs z (2,)."""
     if not setup.of_velocity:
         return command_of_inputs(setup.params[i], setup.limits[i], state, z, most_radps, setup.dt_s)
     speed = math.hypot(z[0], z[1])
     if speed <= SAME:
-        return 0.0, wanted[1]
+        return 0.0, nominal[1]
     return speed, wrap_degrees(math.degrees(math.atan2(z[0], z[1])) - state[L.HEADING])
 
 
@@ -169,14 +170,14 @@ def _pair_rows(ours: BoolArray, acts: Array, need: Array, B: Array, box: Array, 
 @kernel
 def decide_game(setup: Setup, game: Games, acts: Array, need: Array) -> None:
     """Decide for the boats of ours in one game, (n, ...) each."""
-    state, wanted, ours, own = game.state, game.wanted, game.ours, np.flatnonzero(game.ours)
+    state, nominal, ours, own = game.state, game.nominal, game.ours, np.flatnonzero(game.ours)
     n, sides = len(ours), FACETS if setup.of_velocity else 4
     z0, most, hard = np.zeros(2 * n), np.zeros(n), sides * len(own)
     B, box = np.zeros((n, 2, 4)), np.zeros((2 * n, 2))
     C, d = np.zeros((hard + n * len(own), 2 * n)), np.zeros(hard + n * len(own))
     for m, i in enumerate(own):
         at, limits = slice(2 * i, 2 * i + 2), slice(sides * m, sides * m + sides)
-        most[i] = _inputs(setup, int(i), state[i], wanted[i], z0[at], B[i], box[at], C[limits, at], d[limits])
+        most[i] = _inputs(setup, int(i), state[i], nominal[i], z0[at], B[i], box[at], C[limits, at], d[limits])
     pairs = _pair_rows(ours, acts, need, B, box, C[hard:], d[hard:])
     rows = hard + len(pairs)
     if holds(C[hard:rows], d[hard:rows], z0, SAME):
@@ -189,10 +190,10 @@ def decide_game(setup: Setup, game: Games, acts: Array, need: Array) -> None:
                 game.reason[i] = status
     for i in own:
         if game.reason[i] == UNSOLVED:
-            game.sent[i, 0] = 0.0
+            game.filtered[i, 0] = 0.0
         elif np.abs(z - z0)[2 * i : 2 * i + 2].max() > SAME:
-            to = _command(setup, int(i), state[i], wanted[i], z[2 * i : 2 * i + 2], most[i])
-            game.sent[i, 0], game.sent[i, 1], game.reason[i] = to[0], to[1], max(game.reason[i], SOLVED)
+            to = _command(setup, int(i), state[i], nominal[i], z[2 * i : 2 * i + 2], most[i])
+            game.filtered[i, 0], game.filtered[i, 1], game.reason[i] = to[0], to[1], max(game.reason[i], SOLVED)
 
 
 @kernel
@@ -200,3 +201,10 @@ def decide_games(setup: Setup, games: Games, acts: Array, need: Array) -> None:
     """`decide_game` for every game; arrays carry a leading games axis."""
     for b in range(len(games.state)):
         decide_game(setup, game_of(games, b), acts[b], need[b])
+
+
+def __getattr__(name: str) -> Any:
+    if name != "TextbookGuard":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    warn("TextbookGuard is called TextbookFilter", DeprecationWarning, stacklevel=2)
+    return TextbookFilter

@@ -16,7 +16,6 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from steerclear.experiments.baselines.active_set import OPTIMAL, project
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import Platform, step_boat
 from steerclear.shield.platforms import layout as L
@@ -25,6 +24,7 @@ from steerclear.shield.platforms.limits import LONGEST_S, cruise
 from steerclear.shield.platforms.usv import clamp, fresh_state, wrap_degrees
 
 from ..jit import kernel
+from .active_set import OPTIMAL, project
 
 SOLVED, RELAXED, UNSOLVED = 1, 2, 3
 TOLERANCE = 1e-7

@@ -1,4 +1,4 @@
-"""Encounters: boats that meet, in families of thousands, with any filter in the place of the shield.
+"""Encounters: boats that meet, in families of thousands, with any safety filter in the place of the shield.
 
 From Python::
 
@@ -7,15 +7,15 @@ From Python::
                       conditions=Conditions(radius_m=2.5))
     outcome.summary["breached"], outcome.columns["closest_m"].min()
 
-``draw`` gives the scenes alone, ``play`` plays them with any guard (a safety filter) and returns every state. A guard
-decides in water and in the dark as the batched shield does: ``decide(state, wanted, ours) -> sent``, ``reason``,
+``draw`` gives the scenes alone, ``play`` plays them with any safety filter and returns every state. A filter decides
+in water and in the dark as the batched shield does: ``decide(state, nominal, ours) -> filtered``, ``reason``,
 ``safety_margin_m``.
 """
 
 from typing import Any
 from warnings import warn
 
-from ..baselines.registry import build_guard, parse_guards
+from ..baselines.registry import build_filter, parse_filters
 from .figures import Outcome, measure
 from .scenarios import FAMILIES, draw, get_family
 from .scene import DT_S, Conditions, Scenes
@@ -28,17 +28,18 @@ __all__ = [
     "Outcome",
     "Scenes",
     "Trajectory",
-    "build_guard",
+    "build_filter",
     "draw",
     "get_family",
     "measure",
-    "parse_guards",
+    "parse_filters",
     "play",
 ]
+_OLD = {"Film": "Trajectory", "build_guard": "build_filter", "parse_guards": "parse_filters"}
 
 
 def __getattr__(name: str) -> Any:
-    if name != "Film":
+    if name not in _OLD:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    warn("Film is called Trajectory", DeprecationWarning, stacklevel=2)
-    return Trajectory
+    warn(f"{name} is called {_OLD[name]}", DeprecationWarning, stacklevel=2)
+    return globals()[_OLD[name]]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import cached_property, lru_cache
 from typing import Any
 from zlib import crc32
 
@@ -15,7 +14,7 @@ from steerclear.shield.platforms import layout as L
 from steerclear.shield.tracks import thrust_at
 
 from ..play.conditions import draw
-from . import script as S
+from . import scene as S
 from .scene import Box, Conditions
 
 STANDARD_FIELD_M = (80.0, 40.0)
@@ -26,56 +25,40 @@ Point = tuple[float, float]
 
 
 class SceneBuilder:
-    """One encounter in the making; everything random in it comes from ``rng``.
+    """One encounter in the making; everything random in it comes from ``rng``, of seed, family, platforms and number.
 
-    Args:
-        own: platform of the own boats.
-        other: platform of the others (and of the second teammate, where a family has only teammates).
-        conditions: the radius decides how far apart boats start.
-        seed: of the run.
-        family: name of the family.
-        number: of the encounter.
+    ``other`` is the platform of the others, and of the second teammate, where a family has only teammates.
     """
 
     def __init__(self, own: str, other: str, conditions: Conditions, seed: int, family: str, number: int) -> None:
-        self.own, self.other = own, other
-        self.radius_m, self.number = conditions.radius_m, number
-        tag = crc32(f"{family}|{own}|{other}".encode())
-        self.rng = np.random.default_rng([seed, tag, number])
-        self.scale = max(_scale(self.own), _scale(self.other))
+        self.own, self.other, self.names, self.number = own, other, (own, other), number
+        self.own_mps, self.other_mps = self.top(own), self.top(other)
+        self.radius_m, self.scale = conditions.radius_m, max(_scale(own), _scale(other))
+        self.rng = np.random.default_rng([seed, crc32(f"{family}|{own}|{other}".encode()), number])
+        self.nearest_m = 9.0 * self.scale + 2.0 * (self.radius_m - 2.5)
+        """Distance at which others start, at least, m: outside of what a boat of its size can force."""
+        self.farthest_m = 30.0 * self.scale
+        self.length_s = 30.0 + 15.0 * min(self.scale, 4.0)
+        self.clear()
+
+    def clear(self) -> None:
+        """Take all boats out again."""
         self.platforms: list[str] = []
         self.team: list[int] = []
         self.state: list[Array] = []
         self.script: list[Array] = []
         self.goals: list[list[Point]] = []
         self.variants: list[tuple[int, Array]] = []
-        self.current = (1.0, 0.0)
-        self.noise_seed = 0
 
     def settle(self) -> None:
         """Draw what is not a boat: the current's direction and the seed of the position errors."""
         self.current, self.noise_seed = draw(self.rng)
-
-    def clear(self) -> None:
-        """Take all boats out again."""
-        for line in (self.platforms, self.team, self.state, self.script, self.goals, self.variants):
-            line.clear()
 
     def scripts(self) -> list[list[Array]]:
         """Scripts of all boats, once per variant."""
         if not self.variants:
             return [self.script]
         return [[row if k == boat else own for k, own in enumerate(self.script)] for boat, row in self.variants]
-
-    @cached_property
-    def nearest_m(self) -> float:
-        """Distance at which others start, at least, m: outside of what a boat of its size can force."""
-        return 9.0 * self.scale + 2.0 * (self.radius_m - 2.5)
-
-    @property
-    def farthest_m(self) -> float:
-        """Distance at which others start, at most, m."""
-        return 30.0 * self.scale
 
     def field(self, boats: int = 2) -> Box:
         """The field for so many boats, m: 80 x 40 for herons, 160 x 80 for surveyors, larger for large crowds."""
@@ -98,10 +81,6 @@ class SceneBuilder:
         """True with that probability."""
         return bool(self.rng.random() < share)
 
-    def range_m(self) -> float:
-        """A distance to start at, m."""
-        return self.uniform(self.nearest_m, self.farthest_m)
-
     def reached_m(self, platform: str) -> float:
         """Distance within which a goal counts as reached, m."""
         return 3.0 * _scale(platform)
@@ -110,18 +89,18 @@ class SceneBuilder:
         """An own boat that makes for its goals at top speed; ``speed`` is the share of top speed it starts with."""
         platform = name or self.own
         row = S.to_goals(self.top(platform), self.reached_m(platform))
-        return self._add(0, platform, x, y, heading_deg, speed, row, list(goals))
+        return self._add(0, platform, (x, y, heading_deg), speed, row, list(goals))
 
     def add_other(self, x: float, y: float, heading_deg: float, speed: float, row: Array, *goals: Point) -> int:
         """A boat of the others, with its script."""
-        return self._add(1, self.other, x, y, heading_deg, speed, row, list(goals) or [(FAR_M, FAR_M)])
+        return self._add(1, self.other, (x, y, heading_deg), speed, row, list(goals) or [(FAR_M, FAR_M)])
 
     def _add(
-        self, team: int, platform: str, x: float, y: float, heading: float, share: float, row: Array, goals: list[Point]
+        self, team: int, platform: str, pose: tuple[float, float, float], share: float, row: Array, goals: list[Point]
     ) -> int:
         self.platforms.append(platform)
         self.team.append(team)
-        self.state.append(under_way(platform, x, y, heading, share * self.top(platform)))
+        self.state.append(under_way(platform, *pose, share * self.top(platform)))
         self.script.append(row)
         self.goals.append(goals)
         return len(self.state) - 1
@@ -131,7 +110,7 @@ class SceneBuilder:
         return all(math.hypot(x - row[L.X], y - row[L.Y]) >= gap_m for row in self.state)
 
     def free_place(self, box: Box, gap_m: float) -> Point:
-        """A place in (xmin, ymin, xmax, ymax) at least ``gap_m`` from every boat there is.
+        """A place in the box at least ``gap_m`` from every boat there is.
 
         Raises:
             ConfigError: none was found in many tries.
@@ -143,8 +122,12 @@ class SceneBuilder:
         raise ConfigError(f"no room for {len(self.state) + 1} boats {gap_m:.1f} m apart; choose a smaller --radius")
 
     def place_in(self, box: Box) -> Point:
-        """Any place in (xmin, ymin, xmax, ymax)."""
+        """Any place in the box."""
         return self.uniform(box[0], box[2]), self.uniform(box[1], box[3])
+
+    def places_in(self, box: Box, count: int) -> list[Point]:
+        """So many places in the box."""
+        return [self.place_in(box) for _ in range(count)]
 
     def turn(self, angle_deg: float) -> None:
         """Turn the whole encounter about the origin, clockwise."""
@@ -155,16 +138,14 @@ class SceneBuilder:
             row[L.HEADING] = wrapped(row[L.HEADING] + angle_deg)
         self.goals = [[(x * cos + y * sin, y * cos - x * sin) for x, y in line] for line in self.goals]
         for row in (*self.script, *(row for _, row in self.variants)):
-            for k in range(S.PHASES):
-                begin = S.PHASE + k * S.N_PHASE
-                if row[begin + S.AIM] == S.AIM_HEADING:
-                    row[begin + S.ANGLE_DEG] = wrapped(row[begin + S.ANGLE_DEG] + angle_deg)
+            phases = S.phases_of(row)
+            by_heading = phases[:, S.AIM] == S.AIM_HEADING
+            phases[by_heading, S.ANGLE_DEG] = wrapped(phases[by_heading, S.ANGLE_DEG] + angle_deg)
 
     def closest_m(self) -> float:
         """Least distance of any two boats, m."""
         places = np.array([row[[L.X, L.Y]] for row in self.state])
-        gaps = [float(np.hypot(*(places[k + 1 :] - here).T).min()) for k, here in enumerate(places[:-1])]
-        return min(gaps)
+        return min(float(np.hypot(*(places[k + 1 :] - here).T).min()) for k, here in enumerate(places[:-1]))
 
 
 def ahead(x: float, y: float, heading_deg: float, way_m: float) -> Point:
@@ -176,11 +157,6 @@ def ahead(x: float, y: float, heading_deg: float, way_m: float) -> Point:
 def bearing(start: Point, end: Point) -> float:
     """Direction from one place to another, deg clockwise from north."""
     return math.degrees(math.atan2(end[0] - start[0], end[1] - start[1]))
-
-
-def within(box: Box, margin_m: float) -> Box:
-    """The box so much smaller on all sides."""
-    return box[0] + margin_m, box[1] + margin_m, box[2] - margin_m, box[3] - margin_m
 
 
 def wrapped(angle_deg: Any) -> Any:
@@ -198,7 +174,6 @@ def under_way(platform: str, x: float, y: float, heading_deg: float, speed_mps: 
     return row
 
 
-@lru_cache(maxsize=32)
 def _scale(platform: str) -> float:
     """How much room a platform needs, a heron being 1 and a surveyor 2."""
     return max(1.0, get_platform(platform).max_speed_mps - 1.0)

@@ -18,22 +18,19 @@ from .scenarios import draw
 from .scene import DT_S, Conditions, Scenes
 from .simulate import Trajectory, play
 
-EDGE_M = 5.0
-"""Water around open-water encounters, m."""
-SHAPE = 1.6
-"""Width over height of its picture."""
-Water = tuple[tuple[float, float], tuple[float, float]]
+EDGE_M, SHAPE = 5.0, 1.6
+"""Water around open-water encounters, m, and width over height of its picture."""
+Water = tuple[np.ndarray, np.ndarray]
 """Lower left corner and size of what a replay shows, m."""
 
 
 def records_with_and_without(scenes: Scenes, guard: str, conditions: Conditions, name: str) -> list[Record]:
-    """The first game of some scenes, played with a guard and without, as records."""
-    played = [(play(scenes, one, conditions), one) for one in dict.fromkeys((guard, NONE))]
-    return records_of(played, 0, name)
+    """The first game of some scenes, played with a filter and without, as records."""
+    return records_of([(play(scenes, one, conditions), one) for one in dict.fromkeys((guard, NONE))], 0, name)
 
 
 def replay_worst(worst: Sequence[Mapping[str, Any]], conditions: Conditions, seed: int, path: Path) -> Path:
-    """Play the worst encounters again, with their guard and without, into one replay."""
+    """Play the worst encounters again, with their filter and without, into one replay."""
     records = []
     for entry in worst:
         scenes = draw(entry["family"], entry["own"], entry["other"], conditions, seed, entry["number"], 1)
@@ -43,45 +40,51 @@ def replay_worst(worst: Sequence[Mapping[str, Any]], conditions: Conditions, see
 
 
 def records_of(played: Sequence[tuple[Trajectory, str]], game: int, name: str) -> list[Record]:
-    """One game, played with different guards, as records that show the same water.
-
-    Args:
-        played: what was played, and the name of the guard.
-        game: which of the games.
-        name: of the encounter.
-    """
-    water = _water_of(played[0][0], [one.state[:, game, :, :2] for one, _ in played])
+    """One game of what was played with filters of some names, as records that show the same water."""
+    water = _water_of([one.state[:, game, :, :2] for one, _ in played], played[0][0].scenes)
     return [record_of(one, game, f"{name}, {guard}", guard != NONE, water) for one, guard in played]
 
 
 def record_of(played: Trajectory, game: int, title: str, guarded: bool, water: Water | None = None) -> Record:
-    """One game as the record that replays, films and pictures are made of.
-
-    Args:
-        played: what was played.
-        game: which of its games.
-        title: shown as the game's name.
-        guarded: whether its commands passed a guard.
-        water: what the picture shows; around what happens when left out.
-    """
-    scenes, steps, n = played.scenes, played.scenes.steps, len(played.scenes.team)
+    """One game as a record; ``guarded``: its commands passed a filter; ``water``: shown, around all when left out."""
+    scenes, steps, n, radius_m = played.scenes, played.scenes.steps, len(played.scenes.team), played.conditions.radius_m
     state, margin_m = played.state[:, game], played.safety_margin_m[:, game]
-    corner, bounds = water or _water_of(played, [state[:, :, :2]])
-    position, heading = state[:, :, :2] - np.array(corner), state[:, :, L.HEADING]
+    corner, size = water or _water_of([state[:, :, :2]], scenes)
+    position, heading = state[:, :, :2] - corner, state[:, :, L.HEADING]
     own = np.broadcast_to(scenes.own & guarded, (steps, n))
     nominal, filtered = (of[:, game].copy() for of in (played.nominal, played.filtered))
     changed = (nominal != filtered).any(axis=2)
     for commands in (nominal, filtered):
         commands[..., 1] = wrapped(commands[..., 1] + heading[:-1])
-    found = find_breaches(position, played.conditions.radius_m)
-    meta = _meta(played, bounds, title, guarded)
+    found, names, bounds = find_breaches(position, radius_m), [f"agent_{k}" for k in range(n)], size.tolist()
+    out_of_sight = [[-1e4, -1e4], [-1e4, -1e4]]  # an encounter has no flags
+    meta = {
+        "dt_s": DT_S,
+        "env_bounds_m": bounds,
+        "team_size": int(scenes.own.sum()),
+        "agent_ids": names,
+        "team": scenes.team.tolist(),
+        "flag_home": out_of_sight,
+        "scrimmage": [[bounds[0], 0.0], bounds],
+        "catch_radius_m": 0.0,
+        "flag_keepout_m": 0.0,
+        "agent_radius_m": radius_m / 2.0,
+        "separation_m": radius_m,
+        "preset": scenes.family,
+        "policies": {"blue": "goals", "red": "scripts"},
+        "shielded": [name for name, own in zip(names, scenes.own, strict=True) if own and guarded],
+        "seed": None,
+        "reason_names": [reason.name for reason in Reason],
+        "platforms": list(scenes.platforms),
+        "title": title,
+    }
     return make_record(
         meta,
         position=position,
         heading_deg=wrapped(heading),
         speed_mps=state[:, :, L.SPEED],
         **{name: np.zeros((steps + 1, n), bool) for name in ("has_flag", "is_tagged", "oob")},
-        flag_position=np.tile(np.array(meta["flag_home"]), (steps + 1, 1, 1)),
+        flag_position=np.tile(np.array(out_of_sight), (steps + 1, 1, 1)),
         captures=np.zeros((steps + 1, 2), np.int64),
         wanted=nominal,
         sent=filtered,
@@ -92,38 +95,11 @@ def record_of(played: Trajectory, game: int, title: str, guarded: bool, water: W
     )
 
 
-def _water_of(played: Trajectory, positions: Sequence[np.ndarray]) -> Water:
+def _water_of(positions: Sequence[np.ndarray], scenes: Scenes) -> Water:
     """The field; in open water what is around all positions (T+1, n, 2), wider than high."""
-    field = played.scenes.field
-    if field is not None:
-        return (field[0], field[1]), (field[2] - field[0], field[3] - field[1])
+    if scenes.field is not None:
+        return np.array(scenes.field[:2]), np.array(scenes.field[2:]) - scenes.field[:2]
     low = np.min([places.min(axis=(0, 1)) for places in positions], axis=0) - EDGE_M
     high = np.max([places.max(axis=(0, 1)) for places in positions], axis=0) + EDGE_M
-    size, middle = high - low, 0.5 * (low + high)
-    size = np.maximum(size, [SHAPE * size[1], size[0] / SHAPE])
-    corner = middle - 0.5 * size
-    return (float(corner[0]), float(corner[1])), (float(size[0]), float(size[1]))
-
-
-def _meta(played: Trajectory, bounds: tuple[float, float], title: str, guarded: bool) -> dict[str, Any]:
-    scenes, names = played.scenes, [f"agent_{k}" for k in range(len(played.scenes.team))]
-    return {
-        "dt_s": DT_S,
-        "env_bounds_m": bounds,
-        "team_size": int(scenes.own.sum()),
-        "agent_ids": names,
-        "team": scenes.team.tolist(),
-        "flag_home": [[-1e4, -1e4], [-1e4, -1e4]],  # an encounter has no flags: out of sight
-        "scrimmage": [[bounds[0], 0.0], [bounds[0], bounds[1]]],
-        "catch_radius_m": 0.0,
-        "flag_keepout_m": 0.0,
-        "agent_radius_m": played.conditions.radius_m / 2.0,
-        "separation_m": played.conditions.radius_m,
-        "preset": scenes.family,
-        "policies": {"blue": "goals", "red": "scripts"},
-        "shielded": [name for name, own in zip(names, scenes.own, strict=True) if own and guarded],
-        "seed": None,
-        "reason_names": [reason.name for reason in Reason],
-        "platforms": list(scenes.platforms),
-        "title": title,
-    }
+    size = np.maximum(high - low, [SHAPE * (high - low)[1], (high - low)[0] / SHAPE])
+    return 0.5 * (low + high) - 0.5 * size, size

@@ -1,31 +1,29 @@
-"""A run of encounters: its settings and jobs, and what is made of their rows."""
+"""A run of encounters: its settings and jobs, what is made of their rows, and the goals of shields."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import get_platform
 
-from ..baselines.registry import NONE, check_guard, is_shield
+from ..baselines.registry import NONE, check_filter, is_shield
 from ..metrics import judged
-from ..play.spec import check_seed
+from ..play.spec import check_count, check_seed
 from ..result_files import table_name
 from ..runner import Experiment, Run
 from ..warming import compile_encounters, compile_judge
 from ..workers import Job, Row
-from .figures import summarise
+from .figures import WORST, summarise
 from .outcomes import Columns, chunk_size, measure_chunk, side_name
 from .scenarios import FAMILIES, draw, get_family
 from .scene import Conditions
 
 Pair = tuple[str, str]
 MOST_ENCOUNTERS = 1_000_000
-"""Encounters of a family, platform and guard at most: all are listed before the first is played."""
-ONE_RAMMER = "rammer_1"
+"""Encounters of a family, platform and filter at most: all are listed before the first is played."""
 UNAVOIDABLE_PERCENT = 1.0
 """Most encounters with several others that may be breached unavoidably, %."""
 MOST_WORST = 10
@@ -33,9 +31,8 @@ FAR_M = 1e4
 """A safety margin beyond this, m, says that nobody is near."""
 
 
-@dataclass(frozen=True)
-class Cell:
-    """One row of the table: a guard on encounters of a family between two platforms."""
+class Cell(NamedTuple):
+    """One row of the table: a safety filter on encounters of a family between two platforms."""
 
     guard: str
     own: str
@@ -45,16 +42,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Settings:
-    """What to play; they are the command line and what results.json keeps.
-
-    Attributes:
-        platforms: platforms of own and other boats.
-        families: names.
-        guards: names.
-        n: encounters per cell.
-        seed: of the scenes, the same for every guard.
-        conditions: of all encounters.
-        judge: whether the post-hoc analysis judges breaches.
+    """What to play; they are the command line and what results.json keeps: ``n`` encounters per cell.
 
     Raises:
         SteerclearError: an unknown name or a number out of range.
@@ -69,13 +57,11 @@ class Settings:
     judge: bool = True
 
     def __post_init__(self) -> None:
-        if not 1 <= self.n <= MOST_ENCOUNTERS:
-            raise ConfigError(f"--n must be at least 1 and at most {MOST_ENCOUNTERS:,}; got {self.n:,}")
+        check_count("--n", self.n, 1, MOST_ENCOUNTERS)
         check_seed(self.seed)
-        for name in self.families:
-            get_family(name)
-        for name in self.guards:
-            check_guard(name)
+        for check, names in ((get_family, self.families), (check_filter, self.guards)):
+            for name in names:
+                check(name)
         for name in {name for pair in self.platforms for name in pair}:
             get_platform(name)
 
@@ -91,7 +77,7 @@ class Settings:
             for family in self.families:
                 size = chunk_size(family, own, other, self.conditions, self.seed)
                 for guard in self.guards:
-                    cell = asdict(Cell(guard, own, other, family))
+                    cell = Cell(guard, own, other, family)._asdict()
                     for first in range(0, self.n, size):
                         yield {"cell": cell, **same, "first": first, "count": min(size, self.n - first)}
 
@@ -101,26 +87,25 @@ def play_job(job: Job) -> list[Row]:
     cell, conditions = Cell(**job["cell"]), Conditions(**job["conditions"])
     scenes = draw(cell.family, cell.own, cell.other, conditions, job["seed"], job["first"], job["count"])
     columns = measure_chunk(scenes, cell.guard, conditions, job["judge"])
-    names = asdict(cell)
-    return [{**names, **dict(zip(columns, values, strict=True))} for values in np.array([*columns.values()]).T.tolist()]
+    rows = np.array([*columns.values()]).T.tolist()
+    return [{**cell._asdict(), **dict(zip(columns, values, strict=True))} for values in rows]
 
 
-def columns_of(rows: Sequence[Row]) -> dict[Cell, Columns]:
+def columns_of(run: Run) -> dict[Cell, Columns]:
     """Rows of encounters as columns, by cell."""
-    groups: dict[Cell, list[Row]] = {}
-    names = Cell.__dataclass_fields__
-    for row in rows:
-        groups.setdefault(Cell(**{name: row[name] for name in names}), []).append(row)
+    if not run.rows:
+        return {}
+    groups = run.table.groupby(list(Cell._fields), sort=False)
     return {
-        cell: {name: np.array([row[name] for row in found], dtype=np.float64) for name in found[0] if name not in names}
-        for cell, found in groups.items()
+        Cell(*names): {name: rows[name].to_numpy(dtype=np.float64) for name in rows if name not in Cell._fields}
+        for names, rows in groups
     }
 
 
 def results_of(run: Run) -> dict[str, Any]:
     """Content of results.json, of what is on disk."""
-    columns = columns_of(run.rows)
-    cells = [{**asdict(cell), **summarise(values)} for cell, values in columns.items()]
+    columns = columns_of(run)
+    cells = [{**cell._asdict(), **summarise(values)} for cell, values in columns.items()]
     goals = goals_of(cells)
     return {
         **run.head(),
@@ -145,19 +130,16 @@ def goals_of(cells: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     for guard in dict.fromkeys(cell["guard"] for cell in cells if is_shield(cell["guard"])):
         own = [cell for cell in cells if cell["guard"] == guard]
         many = [cell for cell in own if FAMILIES[cell["family"]].others > 1]
-        same = [cell for cell in own if cell["family"] == ONE_RAMMER and cell["own"] == cell["other"]]
-        goals.append(_goal(f"{guard}: encounters with avoidable breaches", _total(own, "avoidable"), 0.0, own))
+        same = [cell for cell in own if cell["family"] == "rammer_1" and cell["own"] == cell["other"]]
+        avoidable = float(sum(cell["avoidable"] for cell in own))
+        goals.append(_goal(f"{guard}: encounters with avoidable breaches", avoidable, 0.0, own))
         if same:
-            name = f"{guard}: started outside, breached by one rammer"
-            goals.append(_goal(name, _total(same, "breaches_outside"), 0.0))
+            hit = float(sum(cell["breaches_outside"] for cell in same))
+            goals.append(_goal(f"{guard}: started outside, breached by one rammer", hit, 0.0))
         if many:
             share = 100.0 * max(cell["unavoidable"] / cell["encounters"] for cell in many)
             goals.append(_goal(f"{guard}: unavoidable, worst of several others, %", share, UNAVOIDABLE_PERCENT, many))
     return goals
-
-
-def _total(cells: Sequence[Mapping[str, Any]], name: str) -> float:
-    return float(sum(cell[name] for cell in cells))
 
 
 def _goal(name: str, value: float, limit: float, cells: Sequence[Mapping[str, Any]] = ()) -> dict[str, Any]:
@@ -168,30 +150,18 @@ def _goal(name: str, value: float, limit: float, cells: Sequence[Mapping[str, An
 def worst_encounters(columns: Mapping[Cell, Columns], most: int = MOST_WORST) -> list[dict[str, Any]]:
     """The worst encounters of all cells with a shield: avoidable breaches first, then the closest.
 
-    Without such a cell, those with another guard, or with none.
+    Without such a cell, those with another filter, or with none.
     """
     shields = [cell for cell in columns if is_shield(cell.guard)]
-    cells = shields or [cell for cell in columns if cell.guard != NONE] or list(columns)
     found = []
-    for cell in cells:
+    for cell in shields or [cell for cell in columns if cell.guard != NONE] or columns:
         values = columns[cell]
         for k in np.lexsort((values["closest_m"], -values["avoidable"]))[:most]:
-            one = {name: float(column[k]) for name, column in values.items()}
-            found.append(
-                {
-                    **asdict(cell),
-                    "number": int(one["number"]),
-                    "variant": int(one["variant"]),
-                    "closest_m": one["closest_m"],
-                    "breaches": int(one["breaches_teammate"] + one["breaches_opponent"]),
-                    "avoidable": int(one["avoidable"]),
-                    "last_preventable_s": _finite(one["last_preventable_s"]),
-                    "responsible": side_name(one["responsible"]),
-                    "start_certificate_m": _finite(one["start_certificate_m"]),
-                }
-            )
+            one: dict[str, Any] = {**cell._asdict(), **{name: float(column[k]) for name, column in values.items()}}
+            one["breaches"] = one["breaches_teammate"] + one["breaches_opponent"]
+            one |= {name: int(one[name]) for name in ("number", "variant", "breaches", "avoidable")}
+            one["responsible"] = side_name(one["responsible"])
+            for name in ("last_preventable_s", "start_certificate_m"):
+                one[name] = one[name] if abs(one[name]) < FAR_M else None
+            found.append({name: one[name] for name in WORST})
     return sorted(found, key=lambda entry: (-entry["avoidable"], entry["closest_m"]))[:most]
-
-
-def _finite(value: float) -> float | None:
-    return value if abs(value) < FAR_M else None

@@ -1,4 +1,9 @@
-"""Encounters to be played: where boats start, what steers them, the conditions, and the files that hold them."""
+"""Encounters to be played: where boats start, what steers them, the conditions, and the files that hold them.
+
+What steers a boat is a script: one row of numbers, read by compiled code. It has three phases. A boat starts in phase 0
+and moves on to the next once the time ``AT_S`` of that phase has come or its target is within ``WITHIN_M`` of it. In a
+phase it aims at something, at a speed, off by an angle.
+"""
 
 from __future__ import annotations
 
@@ -14,24 +19,67 @@ from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array, IntArray
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
+from steerclear.shield.tracks import whole_steps
 
 from ..play.conditions import MOST as MOST_CONDITIONS
 from ..play.conditions import check_values
 from ..result_files import read_json, write_json
-from . import script as S
 
 DT_S = 0.1
-RADIUS_M = 2.5
 MOST = {"radius_m": 20.0, **MOST_CONDITIONS}
 FORMAT = 1
 """Of scene files."""
-PER_GAME = ("state", "script", "goals", "current", "noise_seed", "number")
-"""Arrays of scenes with an entry per game."""
+PER_GAME: dict[str, Any] = dict.fromkeys(("state", "script", "goals", "current"), float)
+PER_GAME |= {"noise_seed": "u8", "number": "i8"}
+"""Arrays of scenes with an entry per game, and what they hold."""
 LONGEST_S, FARTHEST_M, FASTEST_MPS = 3600.0, 1e5, 50.0
 MOST_STATES = 2_000_000
 """Boats times games times steps of a scene file: all of them are kept until the last is played."""
 Box = tuple[float, float, float, float]
 """xmin, ymin, xmax, ymax, m."""
+
+
+TARGET, AUTHORITY, REACHED_M, PHASE = range(4)
+"""Columns of a row: the boat that is hunted (-1: the nearest of the other team); whether it turns with all the rudder
+there is, through the derivative of its own autopilot, rather than ask for headings; distance within which a goal counts
+as reached, m; the first column of the phases."""
+PHASES = 3
+AIM, SPEED_MPS, LEAD, ANGLE_DEG, STANDOFF_M, AT_S, WITHIN_M, N_PHASE = range(8)
+"""Columns of a phase: what is aimed at; speed; share of the way to the meeting point by which a hunter aims ahead (0 is
+pure pursuit); angle added to the bearing (the heading itself for `AIM_HEADING`); how far ahead of the target's bow it
+aims, m; time and distance to the target at which the phase begins, s and m (0: never)."""
+N_SCRIPT = PHASE + PHASES * N_PHASE
+AIM_GOALS, AIM_HEADING, AIM_TARGET, AIM_NOWHERE = range(4)
+"""Values of ``AIM``; nowhere: it stays where it is, without speed."""
+
+
+def phase(
+    aim: int,
+    speed_mps: float = 0.0,
+    lead: float = 0.0,
+    angle_deg: float = 0.0,
+    standoff_m: float = 0.0,
+    at_s: float = math.inf,
+    within_m: float = 0.0,
+) -> Array:
+    """One phase, (N_PHASE,); its columns are described above."""
+    return np.array([aim, speed_mps, lead, angle_deg, standoff_m, at_s, within_m], dtype=np.float64)
+
+
+def script(*phases: Array, target: int = -1, authority: bool = False, reached_m: float = 3.0) -> Array:
+    """A script row, (N_SCRIPT,); phases that are left out never begin."""
+    never = [phase(AIM_NOWHERE)] * (PHASES - len(phases))
+    return np.concatenate([[target, authority, reached_m], *phases, *never])
+
+
+def phases_of(row: Array) -> Array:
+    """View of a row's phases, (PHASES, N_PHASE)."""
+    return row[PHASE:].reshape(PHASES, N_PHASE)
+
+
+def to_goals(speed_mps: float, reached_m: float) -> Array:
+    """Script of a boat that makes for its goals in turn."""
+    return script(phase(AIM_GOALS, speed_mps), reached_m=reached_m)
 
 
 @dataclass(frozen=True)
@@ -42,13 +90,13 @@ class Conditions:
         radius_m: separation to keep, m.
         delay_s: time from a command of an own boat to its effect, s.
         noise_m: bound on the error of every position that the own team sees, m.
-        current_mps: speed of the current, m/s; each encounter draws its direction, of which no guard is told.
+        current_mps: speed of the current, m/s; each encounter draws its direction, of which no filter is told.
 
     Raises:
         ConfigError: a value that is not finite, negative or beyond `MOST`.
     """
 
-    radius_m: float = RADIUS_M
+    radius_m: float = 2.5
     delay_s: float = 0.0
     noise_m: float = 0.0
     current_mps: float = 0.0
@@ -57,6 +105,11 @@ class Conditions:
         check_values(asdict(self), MOST)
         if not self.radius_m > 0.0:
             raise ConfigError(f"radius_m is {self.radius_m}; give a radius above 0")
+
+    @property
+    def delay_steps(self) -> int:
+        """Steps from a command of an own boat to its effect."""
+        return whole_steps(self.delay_s, DT_S)
 
 
 @dataclass(frozen=True)
@@ -107,6 +160,11 @@ class Scenes:
         """(n,) boats of the own team."""
         return np.asarray(self.team == 0)
 
+    @property
+    def params(self) -> Array:
+        """(n, N_PARAM) platform rows."""
+        return np.array([get_platform(name).pack() for name in self.platforms])
+
     def take(self, games: Sequence[int] | IntArray) -> Scenes:
         """Some of the games."""
         chosen = np.asarray(games, dtype=np.int64)
@@ -114,25 +172,22 @@ class Scenes:
         return replace(self, **arrays)
 
 
-def join(scenes: Sequence[Scenes]) -> Scenes:
-    """Put batches of the same fleet into one."""
-    arrays: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in scenes]) for name in PER_GAME}
-    return replace(scenes[0], **arrays)
-
-
 def scene_content(scenes: Scenes, conditions: Conditions, **notes: Any) -> dict[str, Any]:
     """What a scene file holds: every number in full, infinite times as null, ``notes`` kept beside it."""
     return {
         "format": FORMAT,
-        "family": scenes.family,
-        "platforms": list(scenes.platforms),
-        "team": scenes.team.tolist(),
-        "field": None if scenes.field is None else list(scenes.field),
-        "length_s": scenes.length_s,
+        **{name: getattr(scenes, name) for name in ("family", "platforms", "field", "length_s")},
+        **{name: _plain(getattr(scenes, name)) for name in ("team", *PER_GAME)},
         "conditions": asdict(conditions),
-        **{name: _mapped(getattr(scenes, name).tolist(), _finite_or_none) for name in PER_GAME},
         **notes,
     }
+
+
+def _plain(array: NDArray[Any]) -> Any:
+    """Nested lists, with None for what JSON has no number for."""
+    plain: Any = array.astype(object)
+    plain[~np.isfinite(array)] = None
+    return plain.tolist()
 
 
 def write_scene(path: Path, scenes: Scenes, conditions: Conditions, **notes: Any) -> Path:
@@ -168,10 +223,8 @@ def scenes_of(content: Mapping[str, Any]) -> tuple[Scenes, Conditions]:
     """
     if content["format"] != FORMAT:
         raise ConfigError(f"the scene has format {content['format']}; this version reads {FORMAT}")
-    kinds = {"noise_seed": np.uint64, "number": np.int64}
-    arrays: dict[str, Any] = {
-        name: np.array(_mapped(content[name], _number_or_inf), dtype=kinds.get(name, np.float64)) for name in PER_GAME
-    }
+    arrays: dict[str, Any] = {name: np.array(content[name], dtype=kind) for name, kind in PER_GAME.items()}
+    arrays["script"][np.isnan(arrays["script"])] = np.inf
     box: Any = None if content["field"] is None else tuple(map(float, content["field"]))
     scenes = Scenes(
         family=str(content["family"]),
@@ -181,68 +234,40 @@ def scenes_of(content: Mapping[str, Any]) -> tuple[Scenes, Conditions]:
         length_s=float(content["length_s"]),
         **arrays,
     )
-    for wrong, words in _faults(scenes):
-        if wrong:
-            raise ConfigError(words)
+    for sound, words in _checks(scenes):
+        if not sound:
+            raise ConfigError(f"the scene {words}")
     return scenes, Conditions(**content["conditions"])
 
 
-def _mapped(value: Any, change: Any) -> Any:
-    return [_mapped(item, change) for item in value] if isinstance(value, list) else change(value)
-
-
-def _finite_or_none(value: Any) -> Any:
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _number_or_inf(value: Any) -> Any:
-    return math.inf if value is None else value
-
-
-def _faults(scenes: Scenes) -> Iterator[tuple[bool, str]]:
-    """What makes scenes unplayable, and whether it is so; each is asked only if none before it is."""
-    team, box, games, n = scenes.team, scenes.field, len(scenes.state), len(scenes.platforms)
-    for name in scenes.platforms:
-        get_platform(name)
-    in_order = team.ndim == 1 and len(team) > 0 and np.isin(team, (0, 1)).all() and team[0] == 0
-    yield (
-        not in_order or bool((np.diff(team) < 0).any()),
-        "the scene's team is 0 for each own boat, which come first, then 1 for each other",
-    )
+def _checks(scenes: Scenes) -> Iterator[tuple[Any, str]]:
+    """What makes scenes playable, and what is said where it is not so; each is asked only if all before it are."""
+    team, box, games, n = scenes.team, scenes.field, scenes.games, len(scenes.params)
+    in_order = team.ndim == 1 and len(team) and np.isin(team, (0, 1)).all() and team[0] == 0
+    yield in_order and (np.diff(team) >= 0).all(), "has a team other than 0 for the own boats, first, then 1 for others"
     is_box = box is None or (len(box) == 4 and np.abs(box).max() <= FARTHEST_M and box[0] < box[2] and box[1] < box[3])
-    yield not is_box, "the scene's field is xmin, ymin, xmax, ymax in m, or null for open water"
+    yield is_box, "has a field that is neither xmin, ymin, xmax, ymax in m nor null for open water"
     goals = max(scenes.goals.shape[2], 1) if scenes.goals.ndim == 4 else 1
-    shapes = ((n,), (games, n, L.N_STATE), (games, n, S.N_SCRIPT), (games, n, goals, 2), (games, 2), (games,), (games,))
+    shapes = ((n,), (games, n, L.N_STATE), (games, n, N_SCRIPT), (games, n, goals, 2), (games, 2), (games,), (games,))
     for name, shape in zip(("team", *PER_GAME), shapes, strict=True):
         found = getattr(scenes, name).shape
-        yield found != shape or games < 1, f"{name} of the scene has shape {found}; expected {shape}"
-    yield from _script_faults(scenes.script, n)
+        yield found == shape and games, f"has a {name} of shape {found}; expected {shape}"
+    script, later = scenes.script, [AT_S, WITHIN_M]
+    phases = script[..., PHASE:].reshape(*script.shape[:-1], PHASES, N_PHASE)
+    known = np.isin(script[..., TARGET], np.arange(-1, n)).all()
+    known = known and np.isin(phases[..., AIM], np.arange(AIM_NOWHERE + 1)).all()
+    yield known, "has a script that names a boat or an aim that there is not"
+    yield np.isin(script[..., AUTHORITY], (0, 1)).all(), "has a script with an authority other than 0 and 1"
+    sizes = np.abs(np.delete(phases, later, axis=-1)).max(), np.abs(script[..., REACHED_M]).max()
+    yield max(sizes) <= FARTHEST_M, "has a script with a number that is not finite, or out of all bounds"
     finite = all(np.isfinite(array).all() for array in (scenes.state, scenes.goals, scenes.current))
-    yield not finite, "the scene holds a state, a goal or a current that is not finite"
+    yield finite, "holds a state, a goal or a current that is not finite"
     farthest_m = max(float(np.abs(part).max(initial=0.0)) for part in (scenes.state[..., [L.X, L.Y]], scenes.goals))
-    yield farthest_m > FARTHEST_M, f"the scene holds a place over {FARTHEST_M / 1e3:g} km away; give m"
-    fastest_mps = float(np.abs(scenes.state[..., L.SPEED]).max())
-    yield fastest_mps > FASTEST_MPS, f"a boat of the scene is faster than {FASTEST_MPS:g} m/s; give m/s"
-    words = "the scene's current is a direction of length 1 (or 0); its speed stands in the conditions"
-    yield float(np.hypot(*scenes.current.T).max()) > 1.0 + 1e-6, words
+    yield farthest_m <= FARTHEST_M, f"holds a place over {FARTHEST_M / 1e3:g} km away; give m"
+    fast = np.abs(scenes.state[..., L.SPEED]).max() > FASTEST_MPS
+    yield not fast, f"holds a boat faster than {FASTEST_MPS:g} m/s; give m/s"
+    yield np.hypot(*scenes.current.T).max() <= 1.0 + 1e-6, "has a current that is no direction, of length 1 or 0"
     length_s = scenes.length_s
-    yield not 0.0 < length_s <= LONGEST_S, f"the scene lasts {length_s} s; give more than 0 and at most an hour"
+    yield 0.0 < length_s <= LONGEST_S, f"lasts {length_s} s; give more than 0 and at most an hour"
     states = games * n * (length_s / DT_S)
-    words = f"the scene is {states:,.0f} states of boats, at most {MOST_STATES:,} are played; divide it"
-    yield states > MOST_STATES, words
-
-
-def _script_faults(script: Array, n: int) -> Iterator[tuple[bool, str]]:
-    """Numbers of boats and of aims must be such; only times and distances at which something begins may be infinite."""
-    phases = script[..., S.PHASE :].reshape(*script.shape[:-1], S.PHASES, S.N_PHASE)
-    known = np.isin(script[..., S.TARGET], np.arange(-1, n)).all()
-    known = known and np.isin(phases[..., S.AIM], np.arange(S.AIM_NOWHERE + 1)).all()
-    yield not known, "the scene's script names a boat or an aim that there is not"
-    flags = np.isin(script[..., S.AUTHORITY], (0, 1)).all()
-    yield not flags, "the scene's script has an authority other than 0 and 1"
-    later = [S.AT_S, S.WITHIN_M]
-    bounded = (np.abs(np.delete(phases, later, axis=-1)) <= FARTHEST_M).all()
-    sound = bounded and not np.isnan(phases[..., later]).any()
-    yield not sound, "the scene's script holds a number that is not finite, or out of all bounds"
-    reached = (np.abs(script[..., S.REACHED_M]) <= FARTHEST_M).all()
-    yield not reached, "the scene's script reaches goals at a distance out of all bounds"
+    yield states <= MOST_STATES, f"is {states:,.0f} states of boats, at most {MOST_STATES:,} are played; divide it"

@@ -12,103 +12,19 @@ import numpy as np
 from numpy.typing import NDArray
 from steerclear.shield.exceptions import FleetError
 from steerclear.shield.jit import Array, IntArray
-from steerclear.shield.platforms import get_platform, step_boat
 from steerclear.shield.platforms import layout as L
+from steerclear.shield.platforms import step_boat
 from steerclear.shield.platforms.actuator import command_for_turn
 from steerclear.shield.platforms.usv import wrap_degrees
-from steerclear.shield.tracks import whole_steps
 
-from ..baselines.registry import Guard, GuardMaker, build_guard
+from ..baselines.registry import FilterMaker, SafetyFilter, build_filter
 from ..jit import kernel
 from ..play.conditions import observe
-from . import script as S
+from . import scene as S
 from .scene import DT_S, Conditions, Scenes
 
 LONGEST_LEAD_S = 20.0
 """A hunter looks no further ahead than this, s."""
-
-
-@kernel
-def bearing_deg(x: float, y: float, to_x: float, to_y: float) -> float:
-    """Direction from one place to another, deg clockwise from north."""
-    return math.degrees(math.atan2(to_x - x, to_y - y))
-
-
-@kernel
-def meeting_s(px: float, py: float, vx: float, vy: float, speed_mps: float) -> float:
-    """Time until a pursuer can meet a target at relative place p that moves with v, or the longest lead, s."""
-    a = vx * vx + vy * vy - speed_mps * speed_mps
-    b = px * vx + py * vy
-    c = px * px + py * py
-    best = LONGEST_LEAD_S
-    if abs(a) < 1e-9:
-        if b < 0.0:
-            best = min(best, -c / (2.0 * b))
-        return best
-    root = b * b - a * c
-    if root < 0.0:
-        return best
-    for sign in (-1.0, 1.0):
-        time_s = (-b + sign * math.sqrt(root)) / a
-        if 0.0 < time_s < best:
-            best = time_s
-    return best
-
-
-@kernel
-def nearest_foe(state: Array, team: IntArray, i: int) -> int:
-    """The nearest boat of another team, or -1."""
-    found, best = -1, math.inf
-    for j in range(state.shape[0]):
-        if team[j] != team[i]:
-            gap = math.hypot(state[j, L.X] - state[i, L.X], state[j, L.Y] - state[i, L.Y])
-            if gap < best:
-                found, best = j, gap
-    return found
-
-
-@kernel
-def hunt_deg(me: Array, target: Array, lead: float, standoff_m: float, speed_mps: float) -> float:
-    """Bearing of a point ahead of the target's bow, moved on by ``lead`` of the way to where it will be."""
-    course = math.radians(target[L.HEADING])
-    east, north = math.sin(course), math.cos(course)
-    x, y = target[L.X] + standoff_m * east, target[L.Y] + standoff_m * north
-    vx, vy = target[L.SPEED] * east, target[L.SPEED] * north
-    ahead_s = lead * meeting_s(x - me[L.X], y - me[L.Y], vx, vy, speed_mps)
-    return bearing_deg(me[L.X], me[L.Y], x + vx * ahead_s, y + vy * ahead_s)
-
-
-@kernel
-def next_phase(row: Array, now: int, time_s: float, gap_m: float) -> int:
-    """The phase a script is in, given the one it was in."""
-    while now + 1 < S.PHASES:
-        begin = S.PHASE + (now + 1) * S.N_PHASE
-        if time_s + 1e-9 < row[begin + S.AT_S] and not gap_m < row[begin + S.WITHIN_M]:
-            break
-        now += 1
-    return now
-
-
-@kernel
-def steer(
-    params: Array, row: Array, now: int, me: Array, target: Array, hunts: bool, goal: Array, nominal: Array
-) -> None:
-    """The command of one boat in a phase of its script: speed m/s and relative heading deg into ``nominal`` (2,)."""
-    begin = S.PHASE + now * S.N_PHASE
-    aim, speed, angle = int(row[begin + S.AIM]), row[begin + S.SPEED_MPS], row[begin + S.ANGLE_DEG]
-    nominal[0], nominal[1] = speed, 0.0
-    if aim == S.AIM_NOWHERE or (aim == S.AIM_TARGET and not hunts):
-        nominal[0] = 0.0
-        return
-    heading = angle
-    if aim == S.AIM_GOALS:
-        heading = angle + bearing_deg(me[L.X], me[L.Y], goal[0], goal[1])
-    elif aim == S.AIM_TARGET:
-        heading = angle + hunt_deg(me, target, row[begin + S.LEAD], row[begin + S.STANDOFF_M], speed)
-    error = wrap_degrees(heading - me[L.HEADING])
-    nominal[1] = error
-    if row[S.AUTHORITY] > 0.0:
-        nominal[1] = command_for_turn(params, me, speed, error, DT_S)
 
 
 class World(NamedTuple):
@@ -137,6 +53,58 @@ class World(NamedTuple):
 
 
 @kernel
+def meeting_s(px: float, py: float, vx: float, vy: float, speed_mps: float) -> float:
+    """Time until a pursuer can meet a target at relative place p that moves with v, or the longest lead, s."""
+    a = vx * vx + vy * vy - speed_mps * speed_mps
+    b = px * vx + py * vy
+    c = px * px + py * py
+    best = LONGEST_LEAD_S
+    if abs(a) < 1e-9:
+        return min(best, -c / (2.0 * b)) if b < 0.0 else best
+    square = b * b - a * c
+    if square >= 0.0:
+        for sign in (-1.0, 1.0):
+            time_s = (-b + sign * math.sqrt(square)) / a
+            if 0.0 < time_s < best:
+                best = time_s
+    return best
+
+
+@kernel
+def hunted_of(state: Array, team: IntArray, i: int, target: int) -> tuple[int, float]:
+    """The boat that boat i hunts, the nearest of another team where no ``target`` is named, or -1; its distance, m."""
+    found, best = -1, math.inf
+    for j in range(state.shape[0]):
+        if j == target or (target < 0 and team[j] != team[i]):
+            gap = math.hypot(state[j, L.X] - state[i, L.X], state[j, L.Y] - state[i, L.Y])
+            if gap < best:
+                found, best = j, gap
+    return found, best
+
+
+@kernel
+def hunt_deg(me: Array, target: Array, lead: float, standoff_m: float, speed_mps: float) -> float:
+    """Bearing of a point ahead of the target's bow, moved on by ``lead`` of the way to where it will be."""
+    course = math.radians(target[L.HEADING])
+    east, north = math.sin(course), math.cos(course)
+    x, y = target[L.X] + standoff_m * east, target[L.Y] + standoff_m * north
+    vx, vy = target[L.SPEED] * east, target[L.SPEED] * north
+    ahead_s = lead * meeting_s(x - me[L.X], y - me[L.Y], vx, vy, speed_mps)
+    return math.degrees(math.atan2(x + vx * ahead_s - me[L.X], y + vy * ahead_s - me[L.Y]))
+
+
+@kernel
+def next_phase(row: Array, now: int, time_s: float, gap_m: float) -> int:
+    """The phase a script is in, given the one it was in."""
+    while now + 1 < S.PHASES:
+        begin = S.PHASE + (now + 1) * S.N_PHASE
+        if time_s + 1e-9 < row[begin + S.AT_S] and not gap_m < row[begin + S.WITHIN_M]:
+            break
+        now += 1
+    return now
+
+
+@kernel
 def want(world: World, time_s: float, nominal: Array) -> None:
     """Write commands (B, n, 2) of all boats; own boats (team 0) steer by what is seen, the others by what is true."""
     for b in range(world.state.shape[0]):
@@ -144,16 +112,24 @@ def want(world: World, time_s: float, nominal: Array) -> None:
             row, known = world.scripts[b, i], world.state[b]
             if world.team[i] == 0:
                 known = world.seen[b]
-            foe = int(row[S.TARGET])
-            if foe < 0:
-                foe = nearest_foe(known, world.team, i)
-            gap = math.inf
-            if foe >= 0:
-                gap = math.hypot(known[foe, L.X] - known[i, L.X], known[foe, L.Y] - known[i, L.Y])
+            me = known[i]
+            hunted, gap = hunted_of(known, world.team, i, int(row[S.TARGET]))
             now = next_phase(row, world.phase_at[b, i], time_s, gap)
             world.phase_at[b, i] = now
-            goal = world.goals[b, i, world.goal_at[b, i]]
-            steer(world.params[i], row, now, known[i], known[max(foe, 0)], foe >= 0, goal, nominal[b, i])
+            begin = S.PHASE + now * S.N_PHASE
+            aim, speed, heading = int(row[begin + S.AIM]), row[begin + S.SPEED_MPS], row[begin + S.ANGLE_DEG]
+            if aim == S.AIM_NOWHERE or (aim == S.AIM_TARGET and hunted < 0):
+                nominal[b, i, 0] = nominal[b, i, 1] = 0.0
+                continue
+            if aim == S.AIM_GOALS:
+                goal = world.goals[b, i, world.goal_at[b, i]]
+                heading += math.degrees(math.atan2(goal[0] - me[L.X], goal[1] - me[L.Y]))
+            elif aim == S.AIM_TARGET:
+                heading += hunt_deg(me, known[hunted], row[begin + S.LEAD], row[begin + S.STANDOFF_M], speed)
+            error = wrap_degrees(heading - me[L.HEADING])
+            if row[S.AUTHORITY] > 0.0:
+                error = command_for_turn(world.params[i], me, speed, error, DT_S)
+            nominal[b, i, 0], nominal[b, i, 1] = speed, error
 
 
 @kernel
@@ -191,10 +167,10 @@ class Trajectory:
         state: (T+1, B, n, N_STATE) true states, index 0 the start.
         nominal: (T, B, n, 2) what boats wanted: speed m/s, relative heading deg.
         filtered: (T, B, n, 2) what they were told; those of other boats are what they wanted.
-        reason: (T, B, n) reason codes of the guard.
-        safety_margin_m: (T, B, n) float32, of the guard.
+        reason: (T, B, n) reason codes of the safety filter.
+        safety_margin_m: (T, B, n) float32, of the safety filter.
         first_goal_s: (B, n) when the first goal was reached, NaN where it was not.
-        decision_us: (T,) time of the guard's call for a step, per game.
+        decision_us: (T,) time of the filter's call for a step, per game.
     """
 
     scenes: Scenes
@@ -216,61 +192,22 @@ class Trajectory:
         return getattr(self, names[name])
 
 
-def play(scenes: Scenes, guard: str | GuardMaker | Guard, conditions: Conditions) -> Trajectory:
-    """Play scenes with a guard for the own boats.
+def play(scenes: Scenes, guard: str | FilterMaker | SafetyFilter, conditions: Conditions) -> Trajectory:
+    """Play scenes with a safety filter for the own boats: a name, what makes one, or one made for just these games.
 
-    Args:
-        scenes: the games.
-        guard: a name, what makes a guard, or a guard made for just these games.
-        conditions: delay, noise and current.
-
-    Returns:
-        Everything that happened. The same scenes, guard and conditions give the same trajectory, and that of a game
-        does not depend on what else is in the batch.
+    The same scenes, filter and conditions give the same trajectory, and that of a game does not depend on what else is
+    in the batch.
 
     Raises:
-        SteerclearError: the guard cannot be made, or what it sends is not finite.
+        SteerclearError: the filter cannot be made, or what it sends is not finite.
     """
     safety_filter: Any = guard
     if isinstance(guard, str) or not hasattr(guard, "decide"):
-        safety_filter = build_guard(guard, scenes, conditions)
-    world, steps, shape = _world(scenes, conditions), scenes.steps, (scenes.games, len(scenes.team))
-    ours = np.broadcast_to(scenes.own, shape).copy()
-    played = Trajectory(
-        scenes=scenes,
-        conditions=conditions,
-        state=np.empty((steps + 1, *shape, L.N_STATE)),
-        nominal=np.empty((steps, *shape, 2)),
-        filtered=np.empty((steps, *shape, 2)),
-        reason=np.zeros((steps, *shape), np.int8),
-        safety_margin_m=np.full((steps, *shape), np.nan, np.float32),
-        first_goal_s=world.first_goal_s,
-        decision_us=np.zeros(steps),
-    )
-    played.state[0] = world.state
-    for step in range(steps):
-        nominal, filtered = played.nominal[step], played.filtered[step]
-        observe(world.state, world.error, world.seeds, conditions.noise_m, step == 0, DT_S, world.seen)
-        want(world, step * DT_S, nominal)
-        started = time.perf_counter()
-        answer = safety_filter.decide(world.seen, nominal, ours)
-        played.decision_us[step] = (time.perf_counter() - started) / scenes.games * 1e6
-        filtered[:] = nominal
-        np.copyto(filtered, answer, where=ours[..., None])
-        if not np.isfinite(filtered).all():
-            b, i, _ = np.argwhere(~np.isfinite(filtered))[0]
-            raise FleetError(f"step {step}: the command for boat {i} of game {b} is not finite: {filtered[b, i]}")
-        played.reason[step], played.safety_margin_m[step] = safety_filter.reason, safety_filter.safety_margin_m
-        move(world, filtered, step)
-        played.state[step + 1] = world.state
-    return played
-
-
-def _world(scenes: Scenes, conditions: Conditions) -> World:
-    shape, delayed = (scenes.games, len(scenes.team)), delay_steps(conditions)
+        safety_filter = build_filter(guard, scenes, conditions)
+    steps, shape, delayed = scenes.steps, (scenes.games, len(scenes.team)), conditions.delay_steps
     held = scenes.state[:, :, [L.SPEED, L.HEADING]]
-    return World(
-        params=np.array([get_platform(name).pack() for name in scenes.platforms]),
+    world = World(
+        params=scenes.params,
         team=scenes.team,
         scripts=scenes.script,
         goals=scenes.goals,
@@ -284,8 +221,31 @@ def _world(scenes: Scenes, conditions: Conditions) -> World:
         first_goal_s=np.full(shape, np.nan),
         queue=np.tile(held, (delayed, 1, 1, 1)).reshape(delayed, *shape, 2),
     )
-
-
-def delay_steps(conditions: Conditions) -> int:
-    """Steps from a command of an own boat to its effect."""
-    return whole_steps(conditions.delay_s, DT_S)
+    played = Trajectory(
+        scenes=scenes,
+        conditions=conditions,
+        state=np.empty((steps + 1, *shape, L.N_STATE)),
+        nominal=np.empty((steps, *shape, 2)),
+        filtered=np.empty((steps, *shape, 2)),
+        reason=np.zeros((steps, *shape), np.int8),
+        safety_margin_m=np.full((steps, *shape), np.nan, np.float32),
+        first_goal_s=world.first_goal_s,
+        decision_us=np.zeros(steps),
+    )
+    ours = np.broadcast_to(scenes.own, shape).copy()
+    played.state[0] = world.state
+    for step in range(steps):
+        nominal, filtered = played.nominal[step], played.filtered[step]
+        observe(world.state, world.error, world.seeds, conditions.noise_m, step == 0, DT_S, world.seen)
+        want(world, step * DT_S, nominal)
+        started = time.perf_counter()
+        answer = safety_filter.decide(world.seen, nominal, ours)
+        played.decision_us[step] = (time.perf_counter() - started) / scenes.games * 1e6
+        filtered[:] = np.where(ours[..., None], answer, nominal)
+        if not np.isfinite(filtered).all():
+            b, i, _ = np.argwhere(~np.isfinite(filtered))[0]
+            raise FleetError(f"step {step}: the command for boat {i} of game {b} is not finite: {filtered[b, i]}")
+        played.reason[step], played.safety_margin_m[step] = safety_filter.reason, safety_filter.safety_margin_m
+        move(world, filtered, step)
+        played.state[step + 1] = world.state
+    return played

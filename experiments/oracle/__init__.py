@@ -1,4 +1,4 @@
-"""Post-hoc avoidability analysis: was a separation violation (breach) avoidable, until when, and who let that pass?
+"""Post-hoc avoidability analysis: was a separation violation avoidable, until when, and who let that pass?
 
 It looks back at a recorded run with every other boat's actual track held fixed in time and searches the own boat's
 commands with a full model of boat and autopilot. It shares no code with the shield and never imports it: what it says
@@ -6,9 +6,9 @@ about the shield is independent of what the shield believes.
 
 How to call it (all arrays float64, numpy)::
 
-    boats = boats_of_rows(params)             # (n, 38) rows, as `Platform.pack()` gives; or a list of `Boat`
+    # boats: (n, 38) rows, as `Platform.pack()` gives, or a list of `Boat`
     verdict = judge(states, boats, own=0, step=123, radius_m=2.5, dt_s=0.1)          # one boat's side -> Verdict
-    both = judge_breach(states, boats, (0, 3), 123, radius_m=2.5, driven=driven)      # both sides -> BreachVerdict
+    both = judge_breach(states, boats, (0, 3), 123, radius_m=2.5, driven=driven)      # both sides
     many = judge_breaches(states, boats, [(123, 0, 3), ...], radius_m=2.5, progress=print)   # list[BreachVerdict]
 
 - ``states`` (T+1, n, 11): every boat's full state row (columns x m, y m, heading deg, speed m/s, thrust, rudder, last
@@ -22,10 +22,9 @@ How to call it (all arrays float64, numpy)::
   ``verdict.plan`` (the avoiding commands), ``both.responsible`` (`Responsible`).
 """
 
-from .boat_model import N_STATE, Boat, boats_of_rows
+from .boat_model import N_STATE, Boat
 from .judge import judge, judge_breach, judge_breaches
-from .settings import AT_ONCE, Motion, Settings
-from .verdict import BreachVerdict, OracleError, Outcome, Plan, Responsible, Verdict
+from .verdict import AT_ONCE, BreachVerdict, Motion, OracleError, Outcome, Plan, Responsible, Settings, Verdict
 
 __all__ = [
     "AT_ONCE",
@@ -39,7 +38,6 @@ __all__ = [
     "Responsible",
     "Settings",
     "Verdict",
-    "boats_of_rows",
     "judge",
     "judge_breach",
     "judge_breaches",

@@ -15,8 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .boat_model import DOWN, HOLD, UP, Array, IntArray, command_of, step
-from .compiled import compiled
+from .boat_model import DOWN, HOLD, UP, Array, IntArray, command_of, compiled, step
 
 N_SPEEDS = 3
 _TRIED = 3  # states of a layer from which simple courses are run to the end
@@ -24,15 +23,9 @@ _LOOK = 5  # steps between looks along a straight course
 
 
 class Task(NamedTuple):
-    """What commands are searched for.
+    """What commands are searched for: of a boat ``p``, to keep ``limit_m`` from ``others`` (K+1, m, 2).
 
-    Attributes:
-        p: parameters of the own boat.
-        others: (K+1, m, 2) tracks, index 0 at the beginning.
-        limit_m: distance to be kept.
-        dt_s: length of a step.
-        rudders: choices of rudder, shares of full, rising, symmetric.
-        sizes: (5,) cells of x, y, heading, speed, thrust.
+    ``rudders``: choices, shares of full, rising, symmetric; ``sizes`` (5,): cells of x, y, heading, speed, thrust.
     """
 
     p: Array
@@ -104,14 +97,6 @@ def _slot(table: IntArray, keys: IntArray, key: int) -> int:
 
 
 @compiled
-def _power_of_two(least: int) -> int:
-    size = 1
-    while size < least:
-        size *= 2
-    return size
-
-
-@compiled
 def _expand(task: Task, layer: Array, k: int, steps: int, room: Layer) -> int:
     """Make the next layer from ``layer``; returns how many states it has."""
     made, keys, rates, origin, table = room
@@ -121,8 +106,7 @@ def _expand(task: Task, layer: Array, k: int, steps: int, room: Layer) -> int:
     s = np.empty(layer.shape[1])
     for node in range(layer.shape[0]):
         for action in range(N_SPEEDS * rudders.size):
-            for c in range(s.size):
-                s[c] = layer[node, c]
+            s[:] = layer[node]
             choice, rudder = action // rudders.size, rudders[action % rudders.size]
             if not clear_after(task, s, choice, rudder, steps, k):
                 continue
@@ -136,34 +120,9 @@ def _expand(task: Task, layer: Array, k: int, steps: int, room: Layer) -> int:
                 table[place] = row
             elif rates[row] >= rate:
                 continue
-            for c in range(s.size):
-                made[row, c] = s[c]
-            keys[row], rates[row] = key, rate
-            origin[row, 0], origin[row, 1] = node, action
+            made[row] = s
+            keys[row], rates[row], origin[row, 0], origin[row, 1] = key, rate, node, action
     return count
-
-
-@compiled
-def _nth(a: Array, k: int) -> float:
-    low, high = 0, a.size - 1
-    while low < high:
-        pivot, i, j = a[(low + high) // 2], low, high
-        while i <= j:
-            while a[i] < pivot:
-                i += 1
-            while a[j] > pivot:
-                j -= 1
-            if i <= j:
-                a[i], a[j] = a[j], a[i]
-                i += 1
-                j -= 1
-        if k <= j:
-            high = j
-        elif k >= i:
-            low = i
-        else:
-            break
-    return a[k]
 
 
 @compiled
@@ -172,44 +131,27 @@ def _choose(rates: Array, width: int) -> NDArray[np.signedinteger[Any]]:
     if rates.size <= width:
         return np.arange(rates.size)
     best = max(1, width - width // 4)
-    border = _nth(rates.copy(), rates.size - best)
-    chosen = np.empty(width, dtype=np.int64)
-    rest = np.empty(rates.size, dtype=np.int64)
-    kept = left = 0
+    border, kept = np.sort(rates)[rates.size - best], 0
+    is_kept = np.zeros(rates.size, np.bool_)
     for i in range(rates.size):
         if rates[i] >= border and kept < best:
-            chosen[kept] = i
-            kept += 1
-        else:
-            rest[left] = i
-            left += 1
-    for j in range(kept, width):
-        chosen[j] = rest[((j - kept) * left) // max(1, width - kept)]
-    return chosen
-
-
-@compiled
-def _run_out(task: Task, start: Array, k: int) -> int:
-    """Return an action that, held to the end, stays clear; -1 when none of the simple ones does."""
-    rudders = task.rudders
-    middle, last, left = rudders.size // 2, rudders.size - 1, task.others.shape[0] - 1 - k
-    for choice in (HOLD, UP, DOWN):
-        for r in (middle, 0, last):
-            if clear_after(task, start.copy(), choice, rudders[r], left, k):
-                return choice * rudders.size + r
-    return -1
+            is_kept[i], kept = True, kept + 1
+    rest = np.flatnonzero(~is_kept)
+    spread = np.arange(width - kept) * rest.size // max(1, width - kept)
+    return np.concatenate((np.flatnonzero(is_kept), rest[spread]))
 
 
 @compiled
 def _finish(task: Task, layer: Array, rates: Array, k: int) -> tuple[int, int]:
-    """Try simple courses from the most promising states; (state, action) of one that stays clear, or (-1, -1)."""
-    left = rates.copy()
+    """Run simple courses from the most promising states; (state, action) of one that stays clear, or (-1, -1)."""
+    left, rudders, steps = rates.copy(), task.rudders, task.others.shape[0] - 1 - k
     for _ in range(min(_TRIED, left.size)):
         node = int(np.argmax(left))
         left[node] = -np.inf
-        action = _run_out(task, layer[node], k)
-        if action >= 0:
-            return node, action
+        for choice in (HOLD, UP, DOWN):
+            for r in (rudders.size // 2, 0, rudders.size - 1):
+                if clear_after(task, layer[node].copy(), choice, rudders[r], steps, k):
+                    return node, choice * rudders.size + r
     return -1, -1
 
 
@@ -217,12 +159,8 @@ def _finish(task: Task, layer: Array, rates: Array, k: int) -> tuple[int, int]:
 def search(task: Task, start: Array, lengths: IntArray, width: int, actions: IntArray) -> tuple[bool, bool]:
     """Look for actions that keep farther than the limit from the others until their tracks end.
 
-    Args:
-        task: what is searched for.
-        start: the own boat's state row at the beginning.
-        lengths: (N,) steps per choice, summing to K.
-        width: most states per layer.
-        actions: (N,) int64, filled with the action of each choice when found: speed choice * rudders + rudder.
+    ``lengths`` (N,) are the steps per choice, summing to K; ``width``: most states per layer; ``actions`` (N,) are
+    filled when found, each speed choice * rudders + rudder.
 
     Returns:
         Whether a sequence was found, and whether no state was ever dropped for lack of width.
@@ -230,7 +168,7 @@ def search(task: Task, start: Array, lengths: IntArray, width: int, actions: Int
     most = width * N_SPEEDS * task.rudders.size
     made, keys = np.empty((most, start.size)), np.empty(most, dtype=np.int64)
     rates, origin = np.empty(most), np.empty((most, 2), dtype=np.int64)
-    room = Layer(made, keys, rates, origin, np.empty(_power_of_two(2 * most), dtype=np.int64))
+    room = Layer(made, keys, rates, origin, np.empty(1 << math.ceil(math.log2(2 * most)), dtype=np.int64))
     history = np.empty((lengths.size, width, 2), dtype=np.int64)
     layer, layer_rates = start.copy().reshape(1, -1), np.zeros(1)
     k, whole = 0, True
@@ -246,12 +184,8 @@ def search(task: Task, start: Array, lengths: IntArray, width: int, actions: Int
             return False, whole
         chosen = _choose(rates[:count], width)
         whole = whole and chosen.size == count
-        layer, layer_rates = np.empty((chosen.size, start.size)), np.empty(chosen.size)
-        for j in range(chosen.size):
-            for c in range(start.size):
-                layer[j, c] = made[chosen[j], c]
-            layer_rates[j] = rates[chosen[j]]
-            history[n, j, 0], history[n, j, 1] = origin[chosen[j], 0], origin[chosen[j], 1]
+        layer, layer_rates = made[chosen], rates[chosen]
+        history[n, : chosen.size] = origin[chosen]
         k += steps
     _trace(history, lengths.size, int(np.argmax(layer_rates)), actions)
     return True, whole

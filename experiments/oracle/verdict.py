@@ -1,4 +1,4 @@
-"""What the post-hoc analysis says about a separation violation, and who is responsible for it.
+"""What the post-hoc analysis is asked with, what it says about a separation violation, and who is responsible.
 
 Responsible is who had the last clear chance: each boat is judged with the other's actual track held fixed, and the boat
 whose last preventable step is the later one let the last chance pass, by the command of that step. When both had their
@@ -10,8 +10,10 @@ a matter of the start.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,12 +25,90 @@ class OracleError(ValueError):
     """A record, boat or setting that cannot be judged; the text names the remedy."""
 
 
+class Level(NamedTuple):
+    """Fineness of a search.
+
+    ``width``: most states kept per layer; ``cells``: sizes of x and y, m, heading, deg, speed, m/s, thrust, percent,
+    states of one layer in the same cell counting as the same; ``rudders``: choices, shares of full rudder, rising;
+    ``schedules``: each a search of its own: lengths of the first choices, s, later ones being as the last.
+    """
+
+    width: int
+    cells: tuple[float, ...]
+    rudders: tuple[float, ...]
+    schedules: tuple[tuple[float, ...], ...]
+
+
+QUICK = Level(150, (0.5, 0.5, 10.0, 0.25, 15.0), (-1.0, 0.0, 1.0), ((0.5, 0.5, 0.5, 1.0),))
+SCHEDULES = ((0.5,), (0.1, 0.1, 0.1, 0.2, 0.2, 0.3), (*(0.1,) * 15, *(0.2,) * 5, 0.3))
+"""Short choices catch the last moment, but differ by less than a cell on a slow boat; longer ones do not."""
+FULL = Level(2000, (0.05, 0.05, 2.0, 0.03, 3.0), (-1.0, -0.5, 0.0, 0.5, 1.0), SCHEDULES)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of a judgement.
+
+    Attributes:
+        look_back_s: T, how long before the violation own commands may begin to differ, s.
+        settle_s: how long after it the radius must still be kept, s. A plan that is clear when the real pair came
+            apart, but heads into the next contact, has avoided nothing; beyond a few seconds, however, the others'
+            recorded tracks answer a boat that is no longer there. 5 s lets a heron turn through 180 deg.
+        longest_s: a violation counts as over after this time, s: boats may be parked side by side for minutes.
+        quick: level tried first; what it finds is proof.
+        full: level that must fail before a violation is called unavoidable.
+    """
+
+    look_back_s: float = 30.0
+    settle_s: float = 5.0
+    longest_s: float = 30.0
+    quick: Level = QUICK
+    full: Level = FULL
+
+    def __post_init__(self) -> None:
+        for name, low in (("look_back_s", 0.1), ("settle_s", 0.0), ("longest_s", 0.0)):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= low):
+                raise OracleError(f"{name} must be a number of seconds, at least {low:g}; got {value}")
+        for level in (self.quick, self.full):
+            lengths_s = [length_s for first_s in level.schedules for length_s in first_s]
+            sound = min((level.width, *level.cells, *lengths_s)) > 0 and level.schedules and all(level.schedules)
+            if not (sound and level.rudders and all(-1 <= value <= 1 for value in level.rudders)):
+                raise OracleError(f"a search level needs positive sizes and rudders within [-1, 1]; got {level}")
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Physics of a record beside its boats.
+
+    Attributes:
+        current_mps: (east, north) speed at which the water carried every boat, m/s.
+        delay_steps: of each boat, steps from a command to its effect; empty: all act at once.
+
+    Raises:
+        OracleError: a current that is not finite, or a delay that is not a number of steps.
+    """
+
+    current_mps: tuple[float, float] = (0.0, 0.0)
+    delay_steps: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        if len(self.current_mps) != 2 or not all(math.isfinite(speed) for speed in self.current_mps):
+            raise OracleError(f"current_mps is {self.current_mps}; give two finite speeds, east and north")
+        if not all(isinstance(steps, int | np.integer) and steps >= 0 for steps in self.delay_steps):
+            raise OracleError(f"delay_steps is {self.delay_steps}; give a whole number of steps, 0 or more, per boat")
+
+
+AT_ONCE = Motion()
+"""Still water and commands that act at once."""
+
+
 class Outcome(str, Enum):
     """Whether a boat could have kept the radius.
 
     AVOIDABLE is proved: there are commands, replayed with the full model. UNAVOIDABLE means that the search was
     exhausted without finding any, at the stated resolution. STARTED_INSIDE: the pair was inside when the record began
-    and never apart before the breach, so that nobody had a chance.
+    and never apart before, so that nobody had a chance.
     """
 
     __str__ = str.__str__
@@ -49,6 +129,21 @@ class Responsible(str, Enum):
     GAME = "game"
     NEITHER = "neither"
     START = "start"
+
+    @classmethod
+    def of(cls, first: Verdict, second: Verdict, driven: NDArray[np.bool_]) -> Responsible:
+        """Who let the later of both boats' last chances pass; ``driven`` (T, n): boats the game drove in each step."""
+        if Outcome.STARTED_INSIDE in (first.outcome, second.outcome):
+            return cls.START
+        lasts = [(verdict, verdict.last_step) for verdict in (first, second) if verdict.last_step is not None]
+        latest = max((last for _, last in lasts), default=-1)
+        late = [(verdict, last) for verdict, last in lasts if last >= latest - 1]
+        free = [verdict for verdict, last in late if not driven[last, verdict.own]]
+        if not late:
+            return cls.NEITHER
+        if not free:
+            return cls.GAME
+        return cls.BOTH if len(free) == 2 else cls.FIRST if free[0] is first else cls.SECOND
 
 
 @dataclass(frozen=True)
@@ -74,7 +169,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class Verdict:
-    """One boat's side of a breach.
+    """One boat's side of a separation violation.
 
     Attributes:
         own: index of the boat that is judged.
@@ -82,8 +177,8 @@ class Verdict:
         step: index of the first state inside the radius.
         radius_m: separation radius, m.
         outcome: see `Outcome`.
-        last_step: the latest state at which a command could still prevent the breach; None where there is none.
-        last_preventable_s: how long before the breach that was, s; None where there is none.
+        last_step: the latest state at which a command could still prevent it; None where there is none.
+        last_preventable_s: how long before the violation that was, s; None where there is none.
         looked_back_s: how far back commands could begin to differ, s: T, or less where the record is shorter.
         end_step: index of the last state up to which the radius had to be kept.
         plan: commands given from ``last_step`` on, which act from there on or so much later as the boat's commands
@@ -109,14 +204,7 @@ class Verdict:
 
 @dataclass(frozen=True)
 class BreachVerdict:
-    """A breach judged from both sides.
-
-    Attributes:
-        step: index of the first state inside the radius.
-        first: verdict on the first boat of the pair.
-        second: verdict on the second.
-        responsible: see `Responsible`.
-    """
+    """A separation violation judged from both sides; ``step`` is the index of the first state inside the radius."""
 
     step: int
     first: Verdict
@@ -136,25 +224,6 @@ class BreachVerdict:
 
     def responsible_boats(self) -> tuple[int, ...]:
         """Return the boats that are responsible: none, one or two."""
-        chosen = {
-            Responsible.FIRST: (self.first.own,),
-            Responsible.SECOND: (self.second.own,),
-            Responsible.BOTH: (self.first.own, self.second.own),
-        }
-        return chosen.get(self.responsible, ())
-
-
-def responsible_of(first: Verdict, second: Verdict, driven: NDArray[np.bool_]) -> Responsible:
-    """Who let the later of both boats' last chances pass; ``driven`` (T, n): boats that the game drove in each step."""
-    if first.outcome is Outcome.STARTED_INSIDE or second.outcome is Outcome.STARTED_INSIDE:
-        return Responsible.START
-    if first.last_step is None and second.last_step is None:
-        return Responsible.NEITHER
-    lasts = [-2 if verdict.last_step is None else verdict.last_step for verdict in (first, second)]
-    late = [verdict for verdict, last in zip((first, second), lasts, strict=True) if last >= max(lasts) - 1]
-    free = [v for v in late if v.last_step is not None and not driven[v.last_step, v.own]]
-    if not free:
-        return Responsible.GAME
-    if len(free) == 2:
-        return Responsible.BOTH
-    return Responsible.FIRST if free[0] is first else Responsible.SECOND
+        first, second, both = Responsible.FIRST, Responsible.SECOND, Responsible.BOTH
+        sides = ((self.first, (first, both)), (self.second, (second, both)))
+        return tuple(verdict.own for verdict, named in sides if self.responsible in named)

@@ -25,7 +25,26 @@ from .sets import BAND_M, BEYOND, LONGEST_S, MISSED_PERCENT_GOAL, RATIO_GOAL, Pl
 
 COLOURS = ("#e3bfae", "#a5c5d1", "#c5cba0", "#c6a8d1")
 SHOWN_DEG = (0.0, 90.0, 180.0)
-SETS_HEADS = ("own/other m/s", "heading", "shield, m²", "reachability, m²", "ratio", "missed, m²", "missed, %")
+AREA_HEADS = ["own/other m/s", *(f"{heading:g}°" for heading in HEADINGS_DEG)]
+_PLACE = {"own/other m/s": "{0.own_mps:g}/{0.other_mps:g}", "heading": "{0.heading_deg:g}°"}
+SETS_COLUMNS = {
+    **_PLACE,
+    "shield, m²": "{0.shield_m2:.1f}",
+    "reachability, m²": "{0.reach_m2:.1f}",
+    "ratio": "{0.ratio:.2f}",
+    "missed, m²": "{0.missed_m2:.2f}",
+    "missed, %": "{0.missed_percent:.1f}",
+}
+PLAYED_COLUMNS = {
+    "own/other": _PLACE["own/other m/s"],
+    "heading": _PLACE["heading"],
+    "reach, m²": "{0.reach_m2:.1f}",
+    "lost, m²": "{0.lost_m2:.1f}",
+    "ratio": "{0.ratio:.2f}",
+    "by table": "{0.player_ratio:.2f}",
+    "played": "{0.played:,}",
+    "lost beyond": "{0.tried_lost} of {0.tried:,}",
+}
 SETS_WORDS = f"""Positions of an opponent from which the radius is not sure to be kept, by area: where the shield's
 certificate is negative, and where the worst-case value table is below the radius. Both boats at full thrust; the
 heading is the opponent's relative to the own one, 180° is head-on. "Missed" is the area that the table calls lost and
@@ -38,7 +57,6 @@ A set much larger than the table's costs freedom, one that misses positions cost
 LOOKED_UP = """The shield looks opponents up in this very table, so its set is the table's at a margin: the ratio is
 what the margin costs, and that nothing is missed says nothing. `--shield-set opponent_model=turning_circle` compares
 manoeuvres instead."""
-PLAYED_HEADS = ("own/other", "heading", "reach, m²", "lost, m²", "ratio", "by table", "played", "lost beyond")
 PLAYED_WORDS = f"""Found by playing, to the radius, where [unsafe_sets.md](unsafe_sets.md) tells what the shield
 *promises*. Every position of the opponent whose worst-case value is below the radius counts as lost, as nobody can
 save the boat there. From all of a value up to {BAND_M:g} m above it games are played with the shield as it comes, and
@@ -53,28 +71,15 @@ is lost there the table promised and could not keep, since it is a grid. The goa
 reachability set's area in every row, and none lost beyond."""
 
 
-def sets_rows(pairs: Sequence[SetPair]) -> list[list[str]]:
-    """Rows under `SETS_HEADS`."""
-    return [
-        [
-            f"{pair.own_mps:g}/{pair.other_mps:g}",
-            f"{pair.heading_deg:g}°",
-            f"{pair.shield_m2:.1f}",
-            f"{pair.reach_m2:.1f}",
-            f"{pair.ratio:.2f}",
-            f"{pair.missed_m2:.2f}",
-            f"{pair.missed_percent:.1f}",
-        ]
-        for pair in pairs
-    ]
+def rows_of(sets: Sequence[SetPair | PlayedSet], columns: Mapping[str, str]) -> list[list[str]]:
+    """Rows of a table with these columns."""
+    return [[text.format(one) for text in columns.values()] for one in sets]
 
 
 def sets_goals(pairs: Sequence[SetPair], looked_up: bool = False) -> list[dict[str, Any]]:
     """Goals over all pairs: how much larger the shield's set is, and how much of the table's it misses.
 
-    Args:
-        pairs: the comparison.
-        looked_up: whether the shield reads the same table; what it misses then says nothing and is not judged.
+    Where the shield reads the same table (``looked_up``), what it misses says nothing and is not judged.
     """
     ratio, missed = max(pair.ratio for pair in pairs), max(pair.missed_percent for pair in pairs)
     missed_goal = judged("set the shield misses, %, largest", missed, "<=", MISSED_PERCENT_GOAL)
@@ -88,8 +93,7 @@ def sets_content(
     settings: Mapping[str, Any], pairs: Sequence[SetPair], looked_up: bool, started_s: float
 ) -> dict[str, Any]:
     """The comparison as JSON; `docs_keys.SETS` describes it."""
-    goals = sets_goals(pairs, looked_up)
-    head = head_of("reach-compare", settings, started_s)
+    goals, head = sets_goals(pairs, looked_up), head_of("reach-compare", settings, started_s)
     rows = [asdict(pair) for pair in pairs]
     return {**head, "looked_up": looked_up, "pairs": rows, "goals": goals, "deprecated": {"bars": goals}}
 
@@ -99,41 +103,26 @@ def sets_page(contents: Sequence[Mapping[str, Any]]) -> str:
     lines = ["# Sets the shield cannot promise to save", "", MADE, "", SETS_WORDS, ""]
     for content in contents:
         pairs, looked_up = [SetPair(**pair) for pair in content["pairs"]], content["looked_up"]
-        rows = (SETS_HEADS, sets_rows(pairs))
-        lines += _section(content, rows, [LOOKED_UP, ""] if looked_up else [])
+        lines += _section(content, pairs, SETS_COLUMNS, [LOOKED_UP, ""] if looked_up else [])
         met = sum(all(goal["met"] is not False for goal in sets_goals([pair], looked_up)) for pair in pairs)
         lines += [f"{met} of {len(pairs)} rows within the goals. {_version(content)}", ""]
     return "\n".join(lines)
 
 
-def _section(content: Mapping[str, Any], rows: tuple[Sequence[str], list[list[str]]], words: list[str]) -> list[str]:
+def _section(
+    content: Mapping[str, Any], sets: Sequence[Any], columns: Mapping[str, str], words: Sequence[str] = ()
+) -> list[str]:
     """Lines of a page about one pair of boats: settings, table, goals."""
     settings = content["settings"]
     lines = [f"## {line(settings['own'])} meets {line(settings['other'])}, {settings['radius_m']:g} m", ""]
     if settings["shield"]:
         lines += [line(f"Shield settings: {', '.join(f'{k}={v}' for k, v in settings['shield'].items())}."), ""]
-    return [*lines, *words, *table(*rows), "", *goals_table(goals_of(content)), ""]
+    rows = table([*columns], rows_of(sets, columns))
+    return [*lines, *words, *rows, "", *goals_table(goals_of(content)), ""]
 
 
 def _version(content: Mapping[str, Any]) -> str:
     return f"steerclear {line(content['versions']['steerclear'])}."
-
-
-def played_rows(sets: Sequence[PlayedSet]) -> list[list[str]]:
-    """Rows under `PLAYED_HEADS`."""
-    return [
-        [
-            f"{one.own_mps:g}/{one.other_mps:g}",
-            f"{one.heading_deg:g}°",
-            f"{one.reach_m2:.1f}",
-            f"{one.lost_m2:.1f}",
-            f"{one.ratio:.2f}",
-            f"{one.player_ratio:.2f}",
-            f"{one.played:,}",
-            f"{one.tried_lost} of {one.tried:,}",
-        ]
-        for one in sets
-    ]
 
 
 def played_goals(sets: Sequence[PlayedSet]) -> list[dict[str, Any]]:
@@ -159,44 +148,40 @@ def played_page(contents: Sequence[Mapping[str, Any]]) -> str:
     for content in contents:
         names = PlayedSet.__dataclass_fields__
         sets = [PlayedSet(**{name: one[name] for name in names}) for one in content["sets"]]
-        lines += [*_section(content, (PLAYED_HEADS, played_rows(sets)), []), _version(content), ""]
+        lines += [*_section(content, sets, PLAYED_COLUMNS), _version(content), ""]
     return "\n".join(lines)
 
 
 def show_card(console: Console, card: Card) -> None:
     """Print a card: what was solved, how well, and the sets' areas."""
-    grid = card.make_grid()
     console.print(f"{card.own} with {card.other}, {card.other_may}; solved by version {card.version}")
-    nodes = " x ".join(str(n) for n in grid.shape)
-    console.print(f"grid {nodes}, ranges {grid.rho_first_m:g} to {grid.rho_last_m:g} m, step {card.dt_s:g} s")
-    steps = f"{card.iterations} steps ({card.iterations * card.dt_s:g} s of play), last change {card.residual_m:.4f} m"
-    console.print(f"{steps}; values up to {grid.cap_m:g} m")
-    console.print("valid for an own boat at full thrust; at most this far apart under optimal play")
-    heads = ["own/other m/s", *(f"{heading:g}°" for heading in HEADINGS_DEG)]
-    radii = [f"{radius:g}" for radius in card.checked_radii_m]
-    for radius in radii:
+    console.print(f"{_made_how(card)} Values up to {card.make_grid().cap_m:g} m.")
+    console.print("Valid for an own boat at full thrust; at most this far apart under optimal play:")
+    for radius in _radii(card):
         title = f"Area, m², from which {radius} m cannot be kept, by relative heading"
-        console.print("", titled(title, heads, _areas(card, radius)))
-    console.print("", titled("What the table is worth", ["", *(f"{radius} m" for radius in radii)], worth(card)))
+        console.print("", titled(title, AREA_HEADS, _areas(card, radius)))
+    heads = ["", *(f"{radius} m" for radius in _radii(card))]
+    console.print("", titled("What the table is worth", heads, card_rows(card)))
 
 
-def worth(card: Card) -> list[list[str]]:
+def _radii(card: Card) -> list[str]:
+    return [f"{radius:g}" for radius in card.checked_radii_m]
+
+
+def card_rows(card: Card) -> list[list[str]]:
     """Rows of a card's figures: reach, convergence, margin by radius, then the error of the reduced model."""
-    columns = [_worth_of(card, f"{radius:g}") for radius in card.checked_radii_m]
-    return [[name, *(column[name] for column in columns)] for name in (columns[0] if columns else ())]
-
-
-def _worth_of(card: Card, radius: str) -> dict[str, str]:
-    change, margin = card.convergence[radius], card.margin[radius]
-    return {
-        "reach ahead in a head-on, m": f"{card.areas_m2['reach_ahead_m'][radius]:.1f}",
-        f"change of areas on a grid {COARSER:g} times coarser, mean": f"{100 * change['mean']:.1f} %",
-        "the same, largest": f"{100 * change['largest']:.1f} %",
-        "runs of the full model": f"{margin['runs']:,}",
-        "of these breached": f"{margin['breaches']:,}",
-        "deepest breach, m": f"{margin['depth_m']:.2f}",
-        "margin on the value from which none did, m": f"{margin['margin_m']:.2f}",
+    found = [(card.areas_m2["reach_ahead_m"][r], card.convergence[r], card.margin[r]) for r in _radii(card)]
+    rows = {
+        "reach ahead in a head-on, m": "{0:.1f}",
+        f"change of areas on a grid {COARSER:g} times coarser, mean": "{1[mean]:.1%}",
+        "the same, largest": "{1[largest]:.1%}",
+        "runs of the full model": "{2[runs]:,}",
+        "of these breached": "{2[breaches]:,}",
+        "deepest breach, m": "{2[depth_m]:.2f}",
+        "margin on the value from which none did, m": "{2[margin_m]:.2f}",
     }
+    texts = [[name, *(text.format(*one).replace("%", " %") for one in found)] for name, text in rows.items()]
+    return texts if found else []
 
 
 def tables_page(cards: Sequence[str]) -> str:
@@ -209,14 +194,17 @@ def tables_page(cards: Sequence[str]) -> str:
         TableError: one is no card.
     """
     lines = ["# Value tables: figures", "", MADE, "", "What the words mean: [tables.md](tables.md).", ""]
-    heads = ["own/other m/s", *(f"{heading:g}°" for heading in HEADINGS_DEG)]
     for card in map(Card.of_json, cards):
-        radii = [f"{radius:g}" for radius in card.checked_radii_m]
+        errors = [
+            f"{getattr(card, role)} {error['place_m_p99']:.3f} m, {error['speed_mps_p99']:.3f} m/s"
+            for role, error in card.model_error.items()
+        ]
+        error = f"Error of the reduced model over one step, 99th percentile: {'; '.join(dict.fromkeys(errors))}."
         lines += [f"## {line(f'{card.own} with {card.other}, {card.other_may}')}", "", _made_how(card), ""]
-        lines += [*table(["", *(f"{radius} m" for radius in radii)], worth(card)), "", _model_errors(card), ""]
-        for radius in radii:
+        lines += [*table(["", *(f"{radius} m" for radius in _radii(card))], card_rows(card)), "", error, ""]
+        for radius in _radii(card):
             lines += [f"Areas, m², from which {radius} m cannot be kept, by speeds and relative heading:", ""]
-            lines += [*table(heads, _areas(card, radius)), ""]
+            lines += [*table(AREA_HEADS, _areas(card, radius)), ""]
     return "\n".join(lines)
 
 
@@ -233,21 +221,8 @@ def _made_how(card: Card) -> str:
     )
 
 
-def _model_errors(card: Card) -> str:
-    parts = [
-        f"{getattr(card, role)} {error['place_m_p99']:.3f} m, {error['speed_mps_p99']:.3f} m/s"
-        for role, error in card.model_error.items()
-    ]
-    return f"Error of the reduced model over one step, 99th percentile: {'; '.join(dict.fromkeys(parts))}."
-
-
 def draw_sets(values: ValueTable, radii_m: tuple[float, ...], path: Path) -> Path:
-    """Draw where each radius cannot be kept, in the own boat's frame, bow up; one panel a heading and speed pair.
-
-    Args:
-        values: the table.
-        radii_m: separation radii, m.
-        path: file to write; its ending chooses the kind.
+    """Draw where each radius, m, cannot be kept, in the own boat's frame, bow up; one panel a heading and speed pair.
 
     Raises:
         TableError: the file cannot be written.

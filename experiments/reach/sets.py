@@ -47,8 +47,7 @@ LONGEST_S = 45.0
 """Games last as long as the table looks ahead, but no longer."""
 MANNERS = (GREEDY, LEAD, PURE)
 """What the opponent does: what the table calls worst, steer for the meeting point, steer at the boat."""
-AHEAD, AT_IT = 0, 1
-WANTS = (AHEAD, AT_IT)
+WANTS = AHEAD, AT_IT = 0, 1
 """What the boat's policy wants: straight on at top speed, or straight at the opponent."""
 NOT_COMPARED = {
     "separation_m": "both sets are of the radius given with --radius",
@@ -70,16 +69,11 @@ Place = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class SetPair:
-    """Areas of both sets for one pair of speeds and one relative heading, over the same cells.
+    """Areas, m^2, of both sets for one pair of speeds and one relative heading, over the same cells.
 
-    Attributes:
-        own_mps: own speed, m/s.
-        other_mps: the opponent's speed, m/s.
-        heading_deg: heading of the opponent relative to the own one, deg; 180 is head-on.
-        shield_m2: positions of the opponent at which the shield's certificate is negative, m^2.
-        reach_m2: positions at which the table's value is below the radius, m^2.
-        missed_m2: positions of the second kind and not of the first, m^2: the table calls them lost, the shield calls
-            them safe, and one of the two is wrong.
+    Of positions of the opponent: ``shield_m2`` where the shield's certificate is negative, ``reach_m2`` where the
+    table's value is below the radius, ``missed_m2`` the latter without the former: the table calls them lost, the
+    shield calls them safe, and one of the two is wrong.
     """
 
     own_mps: float
@@ -102,18 +96,12 @@ class SetPair:
 
 @dataclass(frozen=True)
 class PlayedSet:
-    """Areas for one pair of speeds and one relative heading.
+    """Areas, m^2, for one pair of speeds and one relative heading.
 
-    Attributes:
-        own_mps: own speed, m/s.
-        other_mps: the opponent's speed, m/s.
-        heading_deg: heading of the opponent relative to the own one, deg; 180 is head-on.
-        reach_m2: positions of the opponent whose value is below the radius, m^2: all count as lost.
-        lost_m2: positions of a value up to `BAND_M` above it from which some opponent reached the shielded boat, m^2.
-        player_m2: those from which some opponent reached a boat that the table itself steers, at top speed, m^2.
-        played: how many of those were played, each against every opponent with every want.
-        tried: positions of higher values that were played.
-        tried_lost: those of them from which an opponent reached the boat.
+    Of positions of the opponent: ``reach_m2`` where the value is below the radius: all count as lost; of a value up to
+    `BAND_M` above it, of which ``played`` were, each against every opponent with every want, ``lost_m2`` from which
+    some opponent reached the shielded boat, ``player_m2`` a boat that the table itself steers, at top speed. Of those
+    of higher values that were ``tried``, an opponent reached the boat from ``tried_lost``.
     """
 
     own_mps: float
@@ -155,15 +143,21 @@ def _config(radius_m: float, settings: Mapping[str, Any], refused: Mapping[str, 
     return ShieldConfig.of(**{"separation_m": radius_m, "profile": "ramming", **given, **settings})
 
 
-def _all_round(values: ValueTable, place: Place, edges: Array, bearings_rad: Array) -> tuple[Array, Array]:
-    """States (k, 2, N_STATE) with the opponent in every cell between range edges, m, at bearings; cells, m^2."""
+def _all_round(values: ValueTable, place: Place, radius_m: float, cells: tuple[int, int, float]) -> tuple[Array, Array]:
+    """States (k, 2, N_STATE) with the opponent in every cell from the radius to the table's range; their areas, m^2.
+
+    ``cells``: ranges, bearings, and where in a cell's bearings the opponent is, a share.
+    """
+    ranges, bearings, within = cells
     heading_deg, own_mps, other_mps = place
     own = full_thrust_state(get_platform(values.card.own), own_mps)
     other = full_thrust_state(get_platform(values.card.other), other_mps, heading_deg)
-    rho, beta = (axis.ravel() for axis in np.meshgrid(0.5 * (edges[1:] + edges[:-1]), bearings_rad, indexing="ij"))
+    edges = np.linspace(radius_m, values.card.make_grid().rho_last_m, ranges + 1)
+    angles = (np.arange(bearings) + within) * (2.0 * math.pi / bearings)
+    rho, beta = (axis.ravel() for axis in np.meshgrid(0.5 * (edges[1:] + edges[:-1]), angles, indexing="ij"))
     state = np.tile(np.stack([own, other]), (rho.size, 1, 1))
     state[:, 1, L.X], state[:, 1, L.Y] = rho * np.sin(beta), rho * np.cos(beta)
-    return state, np.repeat(0.5 * np.diff(edges**2) * (2.0 * math.pi / len(bearings_rad)), len(bearings_rad))
+    return state, np.repeat(0.5 * np.diff(edges**2) * (2.0 * math.pi / bearings), bearings)
 
 
 def values_m(values: ValueTable, state: Array) -> Array:
@@ -191,13 +185,7 @@ def looks_up(values: ValueTable, config: ShieldConfig) -> bool:
 def compare_sets(
     values: ValueTable, config: ShieldConfig, notice: Callable[[int], None] = lambda done: None
 ) -> list[SetPair]:
-    """Areas of both sets at all `places`, both boats at full thrust.
-
-    Args:
-        values: worst-case table of the pair.
-        config: settings; both sets are of the radius it keeps, buffer and position error included.
-        notice: called with the number of places done.
-    """
+    """Areas of both sets, of the radius that ``config`` keeps, at all `places`, both boats at full thrust."""
     found: list[SetPair] = []
     for place in places(values):
         found.append(compare_pair(values, config, *place))
@@ -210,9 +198,7 @@ def compare_pair(
 ) -> SetPair:
     """Areas of both sets, up to the table's range, for one relative heading and pair of speeds."""
     radius_m = config.separation_m + config.buffer_m + 2.0 * config.position_error_m
-    edges = np.linspace(radius_m, values.card.make_grid().rho_last_m, RANGES + 1)
-    bearings = np.asarray(np.arange(BEARINGS) * (2.0 * math.pi / BEARINGS), dtype=np.float64)
-    state, cells = _all_round(values, (heading_deg, own_mps, other_mps), edges, bearings)
+    state, cells = _all_round(values, (heading_deg, own_mps, other_mps), radius_m, (RANGES, BEARINGS, 0.0))
     ours = certificates_m(state, (values.card.own, values.card.other), config) < 0.0
     theirs = values_m(values, state) < radius_m
     disc, areas = math.pi * radius_m**2, [float(cells[lost].sum()) for lost in (ours, theirs, theirs & ~ours)]
@@ -222,9 +208,9 @@ def compare_pair(
 def certificates_m(state: Array, names: tuple[str, str], config: ShieldConfig) -> Array:
     """The shield's certificate for the first boat of every state, m."""
     shield = BatchedShield(config, len(state), names, (0, 1))
-    wanted = np.zeros((len(state), 2, 2))
-    wanted[:, :, 0] = get_platform(names[0]).max_speed_mps
-    shield.decide(state, wanted, np.tile([True, False], (len(state), 1)))
+    nominal = np.zeros((len(state), 2, 2))
+    nominal[:, :, 0] = get_platform(names[0]).max_speed_mps
+    shield.decide(state, nominal, np.tile([True, False], (len(state), 1)))
     return np.asarray(shield.safety_margin_m[:, 0])
 
 
@@ -251,9 +237,7 @@ def play_job(job: Job) -> list[Row]:
     values, radius_m = load_table(job["own"], job["other"], "worst-case"), job["radius_m"]
     heading_deg, own_mps, other_mps = place = tuple(job["place"])
     config = _config(radius_m, job["shield"], NOT_PLAYED)
-    edges = np.linspace(radius_m, values.card.make_grid().rho_last_m, PLAYED_RANGES + 1)
-    bearings = np.asarray((np.arange(PLAYED_BEARINGS) + 0.5) * (2.0 * math.pi / PLAYED_BEARINGS), dtype=np.float64)
-    state, cells_m2 = _all_round(values, place, edges, bearings)
+    state, cells_m2 = _all_round(values, place, radius_m, (PLAYED_RANGES, PLAYED_BEARINGS, 0.5))
     value_m = values_m(values, state)
     reach, band = value_m < radius_m, value_m < radius_m + BAND_M
     beside, beyond = np.flatnonzero(band & ~reach), np.flatnonzero(~band)[::BEYOND]
@@ -284,11 +268,11 @@ def games_lost(values: ValueTable, config: ShieldConfig, start: Array, radius_m:
     reached = np.zeros(len(state), np.bool_)
     if len(state) > 0:
         shield = BatchedShield(config, len(state), names, (0, 1))
-        tables, wanted = stack_tables([values]), np.zeros((len(state), 2, 2))
+        tables, nominal = stack_tables([values]), np.zeros((len(state), 2, 2))
         for _ in range(round(run_s / SUB_STEP_S)):
-            ask(params[0], state, want, wanted)
-            sent = shield.decide(state, wanted, np.stack([~reached, np.zeros_like(reached)], axis=-1))
-            move(tables, params, state, sent, manner, sub_steps(values.card.dt_s), radius_m, reached)
+            ask(params[0], state, want, nominal)
+            filtered = shield.decide(state, nominal, np.stack([~reached, np.zeros_like(reached)], axis=-1))
+            move(tables, params, state, filtered, manner, sub_steps(values.card.dt_s), radius_m, reached)
     return np.asarray(reached.reshape(len(start), len(kinds)).any(axis=1))
 
 
@@ -305,14 +289,14 @@ def duels_lost(values: ValueTable, start: Array, radius_m: float, run_s: float) 
 
 
 @kernel
-def ask(params: Array, state: Array, want: IntArray, wanted: Array) -> None:
+def ask(params: Array, state: Array, want: IntArray, nominal: Array) -> None:
     """Commands the boats' policies want: top speed, straight on or at the opponent."""
     for b in range(state.shape[0]):
         own, other = state[b, 0], state[b, 1]
-        wanted[b, 0, 0], wanted[b, 0, 1] = params[L.MAX_SPEED], 0.0
+        nominal[b, 0, 0], nominal[b, 0, 1] = params[L.MAX_SPEED], 0.0
         if want[b] == AT_IT:
             bearing = math.degrees(math.atan2(other[L.X] - own[L.X], other[L.Y] - own[L.Y]))
-            wanted[b, 0, 1] = wrap_degrees(bearing - own[L.HEADING])
+            nominal[b, 0, 1] = wrap_degrees(bearing - own[L.HEADING])
 
 
 @kernel
@@ -320,7 +304,7 @@ def move(
     tables: Tables,
     params: Array,
     state: Array,
-    sent: Array,
+    filtered: Array,
     manner: IntArray,
     table_steps: int,
     radius_m: float,
@@ -335,6 +319,6 @@ def move(
             _, _, rudder = best_rudders(tables, 0, params, own, other, False, table_steps)
         else:
             rudder = chase(params[1], other, own, manner[b] == LEAD)
-        step_boat(params[0], own, sent[b, 0, 0], sent[b, 0, 1], SUB_STEP_S)
+        step_boat(params[0], own, filtered[b, 0, 0], filtered[b, 0, 1], SUB_STEP_S)
         steer(params[1], other, rudder)
         reached[b] = math.hypot(other[L.X] - own[L.X], other[L.Y] - own[L.Y]) < radius_m

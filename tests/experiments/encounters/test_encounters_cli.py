@@ -1,6 +1,4 @@
 import json
-from dataclasses import asdict
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +9,9 @@ from steerclear.experiments import cli
 from steerclear.experiments import docs_keys as keys
 from steerclear.experiments.console import ExitCode
 from steerclear.experiments.encounters import Conditions, draw, play, results
-from steerclear.experiments.encounters.replay import record_of, records_of
-from steerclear.experiments.encounters.report import MOST_M, cells_table, distribution
-from steerclear.experiments.encounters.results import Cell, goals_of, worst_encounters
+from steerclear.experiments.encounters.replay import record_of
+from steerclear.experiments.encounters.report import cells_table
+from steerclear.experiments.encounters.results import Cell, goals_of
 from steerclear.experiments.encounters.scene import write_scene
 from typer.testing import CliRunner
 
@@ -96,7 +94,7 @@ def _breaching(measure_chunk):
         (["--platform", "a/b/c"], "own/other"),
         (["--platform", ","], "names no platform"),
         (["--family", "headon"], "did you mean 'head_on'"),
-        (["--guard", "wall"], "unknown guard"),
+        (["--guard", "wall"], "unknown safety filter"),
         (["--n", "0"], "--n must be at least 1"),
         (["--seed", "-1"], "--seed must be 0 or more"),
         (["--noise", "9"], "noise_m is 9.0"),
@@ -118,7 +116,7 @@ def test_a_scene_file_is_played_again():
     write_scene(Path("scene.json"), draw("head_on", "heron", "heron", USUAL, 0, 0, 1), USUAL)
     done = run("encounters", "--scene", "scene.json", "--guard", "none", "--out", "out")
     assert done.exit_code == ExitCode.OK, done.output
-    assert "scene.json  none" in done.stdout
+    assert done.stdout.splitlines()[3].split()[:2] == ["scene.json", "none"]
     assert Path("out/replay.html").stat().st_size > 0
 
 
@@ -137,50 +135,15 @@ def test_a_game_of_a_film_is_a_record_within_its_bounds(family):
     assert (record["breaches"][:, 1] == 0).all()
 
 
-def test_the_same_encounter_with_and_without_a_guard_shows_the_same_water():
-    scenes = draw("rammer_1", "heron", "heron", USUAL, 0, 0, 2)
-    near, far = (play(scenes.take([k]), "none", USUAL) for k in (0, 1))
-    far.state[:, :, :, 0] += 100.0
-    first, second = records_of([(near, "none"), (far, "parabolic")], 0, "a name")
-    assert read_meta(first)["env_bounds_m"] == read_meta(second)["env_bounds_m"]
-    assert [read_meta(record)["title"] for record in (first, second)] == ["a name, none", "a name, parabolic"]
-    shifts = [record["position"] - film.state[:, 0, :, :2] for record, film in ((first, near), (second, far))]
-    np.testing.assert_allclose(shifts[0], shifts[1])
-    assert min(record["position"].min() for record in (first, second)) > 0.0
-    assert [read_meta(record)["shielded"] for record in (first, second)] == [[], ["agent_0"]]
-
-
-def cell_columns(closest, avoidable):
-    zeros = np.zeros(len(closest))
-    names = ("number", "variant", "breaches_teammate", "breaches_opponent", "responsible", "start_certificate_m")
-    names += ("last_preventable_s",)
-    return {"closest_m": np.array(closest), "avoidable": np.array(avoidable)} | dict.fromkeys(names, zeros)
-
-
-def test_the_worst_are_the_avoidable_then_the_closest_of_the_shield():
-    shield, none = (Cell(guard, "heron", "heron", "head_on") for guard in ("shield", "none"))
-    columns = {shield: cell_columns([2.0, 1.0, 3.0], [1.0, 0.0, 0.0]), none: cell_columns([0.0], [1.0])}
-    assert [entry["closest_m"] for entry in worst_encounters(columns)] == [2.0, 1.0, 3.0]
-    assert [entry["closest_m"] for entry in worst_encounters({none: columns[none]})] == [0.0]
-
-
 @pytest.mark.parametrize(
     ("avoidable", "unavoidable", "not_judged", "expected"),
     [(0, 0, 0, [True, True]), (1, 0, 0, [False, True]), (0, 2, 0, [True, False]), (0, 0, 1, [None, None])],
 )
 def test_goals_of_the_shield(avoidable, unavoidable, not_judged, expected):
     counts = {"avoidable": avoidable, "unavoidable": unavoidable, "not_judged": not_judged, "encounters": 100}
-    cell = asdict(Cell("shield:straight_horizon_s=4", "heron", "heron", "rammer_2")) | counts
+    cell = Cell("shield:straight_horizon_s=4", "heron", "heron", "rammer_2")._asdict() | counts
     assert [goal["met"] for goal in goals_of([cell])] == expected
     assert goals_of([cell | {"guard": "parabolic"}]) == []
-
-
-@pytest.mark.parametrize(("hits", "met"), [(0, True), (1, False)])
-def test_one_rammer_must_not_breach_what_started_outside(hits, met):
-    counts = {"avoidable": 0, "unavoidable": 0, "not_judged": 1, "encounters": 100, "breaches_outside": hits}
-    cell = asdict(Cell("shield", "heron", "heron", "rammer_1")) | counts
-    assert goals_of([cell])[1]["met"] is met
-    assert len(goals_of([cell | {"other": "surveyor"}])) == 1
 
 
 def test_the_table_of_a_thousand_encounters_cuts_nothing_off_at_80_columns():
@@ -188,7 +151,7 @@ def test_the_table_of_a_thousand_encounters_cuts_nothing_off_at_80_columns():
     names = ("breached", "avoidable", "not_judged", "unavoidable", "started_inside", "breaches_outside", "deadlocked")
     means = dict.fromkeys(("closest_m", "goal_time_ratio"), 2.6) | {"avoidable_upper": 0.003}
     means |= dict.fromkeys(("changed_percent", "reversals_per_min"), 10.6)
-    cell = asdict(Cell("shield", "heron", "heron", "crossing_right")) | dict.fromkeys(names, 0)
+    cell = Cell("shield", "heron", "heron", "crossing_right")._asdict() | dict.fromkeys(names, 0)
     console = Console(width=80)
     with console.capture() as shown:
         console.print(*cells_table({"cells": [cell | counts | means | {"encounters": 1000}]}))
@@ -196,11 +159,3 @@ def test_the_table_of_a_thousand_encounters_cuts_nothing_off_at_80_columns():
     assert "…" not in text
     heads, row = (text.splitlines()[k].split() for k in (1, 3))
     assert (row[0], row[heads.index("out") + 1], row[heads.index("lost") + 1]) == ("crossing_right", "0/1000", "41.7")
-
-
-def test_a_distribution_ends_at_the_edge_and_never_falls():
-    values, shares = distribution([2.0, 3.0, 40.0])
-    assert all(a <= b for a, b in pairwise(values))
-    assert all(a <= b for a, b in pairwise(shares))
-    assert (values[0], shares[0], values[-1], shares[-1]) == (2.0, 0.0, MOST_M, 0.5)
-    assert distribution([40.0, 50.0]) == ([MOST_M, MOST_M], [0.0, 0.0])

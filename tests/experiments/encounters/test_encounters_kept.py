@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from steerclear.experiments.encounters import Conditions, draw, measure, play
 from steerclear.experiments.encounters.outcomes import never_arrived
-from steerclear.experiments.encounters.scene import join
 from steerclear.shield import Reason
 from steerclear.shield.platforms import layout as L
 
@@ -16,7 +15,7 @@ QUARTERS = (173, 189, 253, 397, 403, 437, 480, 498, 503, 627)
 
 
 def crowd_of(number):
-    return play(join([draw("crowd_40", "heron", "heron", USUAL, 0, number, 1)]), "shield", USUAL)
+    return play(draw("crowd_40", "heron", "heron", USUAL, 0, number, 1), "shield", USUAL)
 
 
 def gaps_of(film):
@@ -44,7 +43,7 @@ def test_a_boat_is_not_let_off_by_what_a_team_mate_far_away_cannot_keep(number):
 
 
 def closest_m(guard):
-    scenes = join([draw("rammer_2", "heron", "heron", USUAL, 0, number, 1) for number in QUARTERS])
+    scenes = draw("rammer_2", "heron", "heron", USUAL, 0, 0, max(QUARTERS) + 1).take(QUARTERS)
     place = play(scenes, guard, USUAL).state[..., [L.X, L.Y]]
     return np.linalg.norm(place[:, :, :1] - place[:, :, 1:], axis=-1).min(axis=(0, 2))
 

@@ -29,10 +29,6 @@ print(judge(rows, [own, own], 0, 25, 2.5).outcome, *(n for n in sys.modules if n
 """
 
 
-def test_there_is_something_to_look_at():
-    assert {"judge.py", "boat_model.py", "search.py"} <= {file.name for file in FILES}
-
-
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.name)
 def test_imports_nothing_of_ours_from_outside(file):
     for node in ast.walk(ast.parse(file.read_text())):

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 from oracle_runs import DT_S, driven_track, first_breach, straight_track
-from steerclear.experiments.oracle import Boat, Outcome, judge
-from steerclear.shield.platforms import Platform, fresh_state, get_platform
+from steerclear.experiments.oracle import Outcome, judge
+from steerclear.shield.platforms import Platform, fresh_state
 from steerclear.shield.platforms.proving import reference_models
 
 RADIUS_M = 2.5
@@ -43,43 +43,6 @@ def test_last_stop_before_a_stopped_boat(speed_mps, max_acc):
     assert verdict.outcome is Outcome.AVOIDABLE
     assert verdict.last_step == last
     assert verdict.last_preventable_s == pytest.approx((step - last) * DT_S)
-
-
-@pytest.mark.parametrize("closing_mps", [1.0, 2.5])
-def test_last_stop_head_on_with_a_boat_that_stops_too(closing_mps):
-    # the other brakes from the record's start at 0.25 m/s2; ours must then stop short of where it ends
-    platform = straight_boat(10.0, max_acc=1.0)
-    other = driven_track(
-        straight_boat(10.0, max_acc=0.25).pack(), fresh_state(0, 60.0, 180.0, closing_mps), [(0, 0)] * 400
-    )
-    states, rows = meeting(platform, (0.0, 0.0), 2.0, other, steps=400)
-    step = first_breach(states, RADIUS_M)
-    verdict = judge(states, rows, 0, step, RADIUS_M)
-    stops_at_m = states[:step, 0, 1] + 2.0**2 / 2.0
-    assert other[-1, 3] == 0.0
-    assert verdict.last_step == int(np.flatnonzero(other[-1, 1] - stops_at_m > RADIUS_M + 1e-8)[-1])
-
-
-@pytest.mark.parametrize("distance_m", [2.501, 2.52, 2.58])
-def test_single_integrator_stops_at_once(distance_m):
-    # set to 0, it still moves with the mean of old and new speed for one step: 0.15 m here
-    platform = model("si", "single_integrator", 3.0, max_turn_rate_dps=0.0)
-    speed_mps, ahead_m = 3.0, distance_m + 6.0 + 0.15
-    states, rows = meeting(platform, (0.0, 0.0), speed_mps, straight_track((0.0, ahead_m), (0.0, 0.0), 150))
-    verdict = judge(states, rows, 0, first_breach(states, RADIUS_M), RADIUS_M)
-    assert verdict.last_step == 20
-    assert verdict.plan.closest_m == pytest.approx(distance_m, abs=1e-6)
-
-
-def test_single_integrator_against_a_faster_boat_from_behind():
-    # it can speed up only to its top speed, and has no rudder: nothing helps but starting ahead
-    platform = model("si", "single_integrator", 2.0, max_turn_rate_dps=0.0)
-    states, rows = meeting(platform, (0.0, 0.0), 2.0, straight_track((0.0, -20.0), (0.0, 4.0), 150))
-    verdict = judge(states, rows, 0, first_breach(states, RADIUS_M), RADIUS_M)
-    assert verdict.outcome is Outcome.UNAVOIDABLE
-    assert verdict.exhausted
-    assert verdict.plan is None
-    assert verdict.last_preventable_s is None
 
 
 def dubins(speed_mps, turn_dps):
@@ -137,21 +100,3 @@ def turn_then_straight(row, track, speed_mps, turn_dps):
             path = row[:2] + np.stack([east + run * np.sin(angle), north + run * np.cos(angle)], axis=1)
             best = max(best, float(np.hypot(*(path - track).T)[1:].min()))
     return best
-
-
-def test_heron_without_thrust_cannot_save_itself():
-    # it drifts at 1 m/s with no thrust: the rudder needs thrust, which needs time
-    heron = get_platform("heron")
-    own = fresh_state(0.0, 0.0, 0.0, 1.0)
-    rows = driven_track(heron.pack(), own, [(0.0, 0.0)] * 60)
-    states = np.stack([rows, straight_track((0.0, 2.6), (0.0, 0.0), 60)], axis=1)
-    verdict = judge(states, [heron.pack()] * 2, 0, first_breach(states, RADIUS_M), RADIUS_M)
-    assert verdict.outcome is Outcome.UNAVOIDABLE
-    assert verdict.exhausted
-
-
-def test_boats_given_by_name_of_parameters():
-    own = Boat("single_integrator", 3.0, max_turn_dps=90.0)
-    states = np.stack([straight_track((0, 0), (0, 3.0), 60), straight_track((0, 9.0), (0, 0), 60)], axis=1)
-    states[:, 0, 3] = 3.0
-    assert judge(states, [own, own], 0, first_breach(states, RADIUS_M), RADIUS_M).outcome is Outcome.AVOIDABLE

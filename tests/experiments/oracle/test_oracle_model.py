@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from steerclear.env.trace import load_trace
-from steerclear.experiments.oracle import Boat, OracleError, boats_of_rows
-from steerclear.experiments.oracle.boat_model import DOWN, HOLD, UP, command_of, step
+from steerclear.experiments.oracle.boat_model import DOWN, HOLD, UP, command_of, rows_of, step
 from steerclear.shield.platforms import PLATFORMS, fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L
 
@@ -22,7 +20,7 @@ PLAIN = ("heron_captures", "heron_game_hard", "surveyor_captures", "surveyor_gam
 def test_same_steps_as_the_package(name, dt_s):
     random = np.random.default_rng(5)
     params = get_platform(name).pack()
-    numbers = boats_of_rows(params[None])[0].numbers()
+    numbers = rows_of([params])[0]
     ours = fresh_state(3.0, -2.0, 170.0, 0.5)
     theirs = ours.copy()
     top = params[L.MAX_SPEED]
@@ -39,41 +37,6 @@ def test_same_steps_as_the_package(name, dt_s):
     assert np.ptp([ours[L.X], ours[L.Y], 3.0]) > 1.0
 
 
-@pytest.mark.parametrize("stem", PLAIN)
-def test_same_steps_as_the_recorded_simulator(stem):
-    trace = load_trace(TRACES / f"{stem}.npz")
-    arrays, names = trace.arrays, trace.meta["dynamics"]
-    names = [names] * arrays["position"].shape[1] if isinstance(names, str) else names
-    compared = 0
-    for boat, name in enumerate(names):
-        free = ~(arrays["oob"] | arrays["is_tagged"])[:, boat].astype(bool)
-        steps = int(np.argmin(free)) - 1 if not free.all() else trace.steps
-        steps = min(steps, 400)
-        compared += _follow(arrays, boat, get_platform(name).pack(), steps, trace.meta["dt"])
-    assert compared > 100
-
-
-def _follow(arrays, boat, params, steps, dt_s):
-    """Drive a boat from the record's start by its actions; returns how many steps the record could be followed."""
-    numbers = boats_of_rows(params[None])[0].numbers()
-    state = fresh_state(*arrays["position"][0, boat], arrays["heading"][0, boat], arrays["speed"][0, boat])
-    for k in range(steps):
-        speed_mps, error_deg = arrays["action"][k, boat]
-        if np.isnan(error_deg):
-            return 0
-        moved = np.linalg.norm(arrays["position"][k + 1, boat] - arrays["position"][k, boat])
-        if moved > 1.5 * max(params[L.MAX_SPEED], 0.1) * dt_s or _near_flag(arrays, k, boat):
-            return k
-        step(numbers, state, np.float64(np.float32(speed_mps)), np.float64(np.float32(error_deg)), dt_s)
-        np.testing.assert_allclose(state[:2], arrays["position"][k + 1, boat], atol=2e-5)
-    return max(steps, 0)
-
-
-def _near_flag(arrays, k, boat):
-    gaps = np.linalg.norm(arrays["flag_position"][k + 1] - arrays["position"][k + 1, boat], axis=-1)
-    return gaps.min() < 6.0
-
-
 @settings(max_examples=60, deadline=None)
 @given(
     name=st.sampled_from(["heron", "surveyor"]),
@@ -83,7 +46,7 @@ def _near_flag(arrays, k, boat):
     last=st.one_of(st.just(np.nan), st.floats(-120, 120)),
 )
 def test_command_gives_the_rudder_asked_for(name, rudder, choice, thrust, last):
-    numbers = boats_of_rows(get_platform(name).pack()[None])[0].numbers()
+    numbers = rows_of([get_platform(name).pack()])[0]
     state = fresh_state(0.0, 0.0, 0.0, 1.0)
     state[[L.THRUST, L.HEADING_ERROR, L.SPEED_ERROR]] = thrust, last, 0.0
     speed_mps, error_deg = command_of(numbers, state, choice, rudder, 0.1)
@@ -93,32 +56,3 @@ def test_command_gives_the_rudder_asked_for(name, rudder, choice, thrust, last):
     assert 0.0 <= speed_mps <= numbers[1]
     assert state[L.RUDDER] == pytest.approx(100.0 * rudder, abs=1e-6)
     assert np.sign(round(state[L.THRUST] - before, 9)) == {DOWN: -1, HOLD: 0, UP: 1}[choice]
-
-
-def test_parameters_arrive_where_they_belong():
-    boat = boats_of_rows(get_platform("surveyor").pack()[None])[0]
-    expected = Boat("usv", 3.0, turn_loss=0.85, turn_rate=10.0, max_acc=0.15, max_dec=0.25,
-                    speed_pid=(0.5, 0.0, 0.0, 0.0), heading_pid=(1.2, 0.0, 3.0, 0.0),
-                    thrust_map=((-100, -2), (0, 0), (20, 1), (40, 1.5), (60, 2), (70, 2.25), (100, 3)))  # fmt: skip
-    assert boat == expected
-
-
-@pytest.mark.parametrize(
-    ("rows", "words"),
-    [
-        (np.zeros((2, 37)), "give one row per boat"),
-        (np.full((1, 38), np.nan), "not finite"),
-        (np.zeros((1, 38)), "map points"),
-    ],
-)
-def test_unusable_parameter_rows(rows, words):
-    with pytest.raises(OracleError, match=words):
-        boats_of_rows(rows)
-
-
-@pytest.mark.parametrize(
-    "change", [{"kind": "ship"}, {"max_speed_mps": np.nan}, {"thrust_map": ((0.0, 0.0), (0.0, 1.0))}]
-)
-def test_unusable_boats(change):
-    with pytest.raises(OracleError, match=r"choose one of|finite parameters|rising thrust"):
-        Boat(**{"kind": "usv", "max_speed_mps": 2.0, **change})

@@ -1,9 +1,8 @@
 """Records in which a current carried the boats or commands came late: forgetting either would turn the verdict."""
 
 import numpy as np
-import pytest
-from oracle_runs import DT_S, driven_track, first_breach, straight_track
-from steerclear.experiments.oracle import Boat, Motion, OracleError, Outcome, Responsible, judge, judge_breach
+from oracle_runs import DT_S, driven_track, first_breach
+from steerclear.experiments.oracle import Boat, Motion, Outcome, Responsible, judge, judge_breach
 from steerclear.shield.platforms import fresh_state, get_platform
 
 RADIUS_M = 2.5
@@ -29,17 +28,6 @@ def test_a_boat_that_could_have_stayed_where_the_water_took_it():
     assert told.outcome is Outcome.AVOIDABLE
     forgotten = judge(states, boats, 0, step, RADIUS_M)
     assert forgotten.outcome is Outcome.UNAVOIDABLE  # it cannot outrun a boat that seems to come at 0.5 m/s
-
-
-def test_the_plan_is_where_the_boat_would_have_been_over_ground():
-    states, boats = slow_boat_upstream()
-    verdict = judge(states, boats, 0, first_breach(states, RADIUS_M), RADIUS_M, motion=Motion(CURRENT))
-    plan = verdict.plan
-    np.testing.assert_allclose(plan.path_m[0], states[plan.begin_step, 0, :2], atol=1e-12)
-    others = states[plan.begin_step : verdict.end_step + 1, 1, :2]
-    assert np.hypot(*(plan.path_m - others)[1:].T).min() == pytest.approx(plan.closest_m, abs=1e-9)
-    speed_mps = np.hypot(*(np.diff(plan.path_m, axis=0) / DT_S - CURRENT).T)
-    assert speed_mps.max() <= 0.2 + 1e-9
 
 
 def head_on(gap_m, steps):
@@ -69,51 +57,3 @@ def test_who_had_the_last_chance_is_a_matter_of_when_commands_were_given():
     assert late.first.last_step == at_once.first.last_step - 5
     assert late.first.plan.begin_step == at_once.first.plan.begin_step
     assert late.second.last_step == at_once.second.last_step
-
-
-def test_what_the_game_commanded_counts_when_it_was_commanded():
-    states, rows = head_on(30.0, 120)
-    step = first_breach(states, RADIUS_M)
-    motion = Motion(delay_steps=(5, 5))
-    last = judge(states, rows, 0, step, RADIUS_M, motion=motion).last_step
-    driven = np.zeros((120, 2), dtype=np.bool_)
-    driven[last, :] = True
-    both = judge_breach(states, rows, (0, 1), step, RADIUS_M, driven=driven, motion=motion)
-    assert both.responsible is Responsible.GAME
-    assert judge_breach(states, rows, (0, 1), step, RADIUS_M, driven=driven).responsible is Responsible.BOTH
-
-
-def test_looking_back_no_further_than_the_record():
-    states, rows = head_on(30.0, 120)
-    step = first_breach(states, RADIUS_M)
-    verdict = judge(states, rows, 0, step, RADIUS_M, motion=Motion(delay_steps=(step, 0)))
-    assert (verdict.outcome, verdict.searches) == (Outcome.UNAVOIDABLE, 0)
-    assert verdict.looked_back_s == pytest.approx(step * DT_S)
-
-
-def test_a_pair_that_started_inside_stays_that():
-    still = straight_track((0.0, 2.0), (0.0, 0.0), 30)
-    states = np.stack([driven_track(HERON.pack(), fresh_state(0.0, 0.0, 0.0, 0.0), [(0.0, 0.0)] * 30), still], axis=1)
-    rows = np.array([HERON.pack()] * 2)
-    verdict = judge(states, rows, 0, 1, RADIUS_M, motion=Motion(delay_steps=(5, 5)))
-    assert verdict.outcome is Outcome.STARTED_INSIDE
-
-
-@pytest.mark.parametrize(
-    ("settings", "words"),
-    [
-        ({"current_mps": (np.nan, 0.0)}, "two finite speeds"),
-        ({"current_mps": (0.1,)}, "two finite speeds"),
-        ({"delay_steps": (1, -1)}, "0 or more"),
-        ({"delay_steps": (0.5, 1)}, "whole number"),
-    ],
-)
-def test_motion_that_cannot_be_is_refused(settings, words):
-    with pytest.raises(OracleError, match=words):
-        Motion(**settings)
-
-
-def test_one_delay_per_boat():
-    states, rows = head_on(12.0, 80)
-    with pytest.raises(OracleError, match="one per boat"):
-        judge(states, rows, 0, first_breach(states, RADIUS_M), RADIUS_M, motion=Motion(delay_steps=(5,)))

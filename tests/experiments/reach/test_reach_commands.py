@@ -7,8 +7,8 @@ from steerclear.experiments import cli
 from steerclear.experiments import cli_reach as reach
 from steerclear.experiments.console import ExitCode
 from steerclear.experiments.docs import write_pages
-from steerclear.experiments.reach.pages import draw_sets, tables_page
-from steerclear.shield.exceptions import ConfigError, TableError
+from steerclear.experiments.reach.pages import tables_page
+from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.tables import make
 from steerclear.shield.tables.files import CACHE_VARIABLE, SHIPPED, read_table, save_table
 from typer.testing import CliRunner
@@ -131,11 +131,6 @@ def test_checks_can_fail(tmp_path):
         failed = run("check", f"{name}.npz")
         assert failed.exit_code == ExitCode.GOAL_MISSED
         assert words in flat(failed.output)
-
-
-def test_pictures_that_cannot_be_written_are_told(tmp_path):
-    with pytest.raises(TableError, match=r"cannot be written .* give a \.png or \.svg file"):
-        draw_sets(read_table(HERON), (2.5,), tmp_path / "sets.nonsense")
 
 
 def test_the_page_of_tables_is_made_of_their_cards(tmp_path):

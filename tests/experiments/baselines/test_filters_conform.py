@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from guard_scenes import CONFIG, ahead, crowd, guard_for, scene
-from steerclear.experiments.baselines.registry import NONE, SHIELD, check_guard, filters, parse_guards
+from filter_scenes import CONFIG, ahead, crowd, filter_for, scene
+from steerclear.experiments.baselines.registry import FILTERS, NONE, SHIELD, check_filter, parse_filters
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import ConfigError, FleetError
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.surroundings import OPEN_WATER
 
-NAMES = [name for name in filters() if name not in (NONE, SHIELD)]
+NAMES = [name for name in FILTERS if name not in (NONE, SHIELD)]
 ALL = pytest.mark.parametrize("name", NAMES)
 FAR = pytest.mark.parametrize("name", [name for name in NAMES if name != "parabolic"])
 """With the gains tuned for herons the parabola still asks for something of boats half a kilometre apart."""
@@ -21,7 +21,7 @@ HOLDS = ("reach",)
 def test_safe_commands_pass_bit_for_bit(name):
     random = np.random.default_rng(1)
     state = scene((0, 0, 0), (600, 5, 90), (-700, 0, -90))
-    guard = guard_for(name, state)
+    guard = filter_for(name, state)
     for _ in range(20):
         wanted = np.stack([random.uniform(0, 2, (1, 3)), random.uniform(-40, 40, (1, 3))], axis=2)
         sent = guard.decide(state, wanted, np.ones((1, 3), bool))
@@ -34,7 +34,7 @@ def test_boats_of_others_are_left_alone_and_reset_forgets(name):
     state, ours = scene((0, 0, 0), (0.5, 5, 180)), np.array([[True, False]])
     wanted = ahead(state)
     wanted[0, 1] = np.nan, -0.0
-    guard = guard_for(name, state)
+    guard = filter_for(name, state)
     sent = guard.decide(state, wanted, ours).copy()
     assert sent[0, 1].tobytes() == wanted[0, 1].tobytes()
     assert (sent[0, 0] != wanted[0, 0]).any()
@@ -52,7 +52,7 @@ def test_reason_tells_whether_a_command_was_changed(name):
     state, ours = crowd(100), np.tile([True, True, True, False], (100, 1))
     wanted = ahead(state)
     wanted[..., 1] = np.random.default_rng(3).uniform(-90, 90, state.shape[:2])
-    guard = guard_for(name, state, team=(0, 0, 0, 1))
+    guard = filter_for(name, state, team=(0, 0, 0, 1))
     sent = guard.decide(state, wanted, ours)
     changed = (sent != wanted).any(axis=2)
     assert np.isfinite(sent).all()
@@ -67,10 +67,10 @@ def test_reason_tells_whether_a_command_was_changed(name):
 def test_batches_are_games_one_by_one_and_decisions_repeat(name):
     state, team = crowd(9, 4, 9.0), (0, 0, 1, 1)
     ours = np.tile([True, True, False, False], (len(state), 1))
-    batch = guard_for(name, state, team)
+    batch = filter_for(name, state, team)
     sent = [batch.decide(state, ahead(state), ours).copy() for _ in range(2)]
     for b in range(0, len(state), 3):
-        alone = guard_for(name, state[:1], team)
+        alone = filter_for(name, state[:1], team)
         for one in sent:
             assert alone.decide(state[b : b + 1], ahead(state[:1]), ours[:1])[0].tobytes() == one[b].tobytes()
 
@@ -79,7 +79,7 @@ def test_batches_are_games_one_by_one_and_decisions_repeat(name):
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e300])
 def test_what_is_not_a_number_never_passes(name, bad):
     state, ours = scene((0, 0, 0), (100, 0, 0)), np.array([[True, False]])
-    guard, broken, wanted = guard_for(name, state), state.copy(), ahead(state)
+    guard, broken, wanted = filter_for(name, state), state.copy(), ahead(state)
     broken[0, 1, L.X] = bad
     with pytest.raises(FleetError, match="not finite"):
         guard.decide(broken, wanted, ours)
@@ -94,12 +94,12 @@ def test_what_is_not_a_number_never_passes(name, bad):
 @ALL
 def test_a_fleet_that_does_not_fit_is_refused(name):
     state = scene((0, 0, 0), (20, 0, 0))
-    guard, both = guard_for(name, state), np.ones((1, 2), bool)
-    with pytest.raises(FleetError, match="wanted has shape"):
+    guard, both = filter_for(name, state), np.ones((1, 2), bool)
+    with pytest.raises(FleetError, match="nominal has shape"):
         guard.decide(state, np.zeros((1, 3, 2)), both)
     with pytest.raises(FleetError, match="state has shape"):
         guard.decide(state[0], ahead(state), both)
-    make = filters()[name].make
+    make = FILTERS[name].make
     for config, games, platforms, words in (
         (ShieldConfig(delay_s=0.2), 1, ("heron",), "no delay"),
         (CONFIG, 0, ("heron",), "games is 0"),
@@ -112,7 +112,7 @@ def test_a_fleet_that_does_not_fit_is_refused(name):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("keeper", "unknown guard 'keeper'; choose from none, shield"),
+        ("keeper", "unknown safety filter 'keeper'; choose from none, shield"),
         ("none:a=1", "takes no settings"),
         ("shield:tail", "has no value"),
         ("shield:straight_horizn_s=3", "did you mean 'straight_horizon_s'"),
@@ -131,11 +131,11 @@ def test_a_fleet_that_does_not_fit_is_refused(name):
 )
 def test_bad_names_and_settings_are_refused(text, words):
     with pytest.raises(ConfigError, match=words):
-        check_guard(text)
-    with pytest.raises(ConfigError, match="names no guard"):
-        parse_guards(" , ")
+        check_filter(text)
+    with pytest.raises(ConfigError, match="names no safety filter"):
+        parse_filters(" , ")
 
 
 def test_settings_are_read_from_the_name():
     names = ["none", "reach:cbf_rate_per_s=0.5,buffer_m=1", "gatekeeper:horizon_s=6,switch_s=2", "pl-cbf"]
-    assert parse_guards(",".join(names)) == names
+    assert parse_filters(",".join(names)) == names

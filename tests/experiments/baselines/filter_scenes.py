@@ -1,7 +1,7 @@
-"""Scenes, commands and filters that the tests of all guards share."""
+"""Scenes, commands and filters that the tests of all filters share."""
 
 import numpy as np
-from steerclear.experiments.baselines.registry import filters
+from steerclear.experiments.baselines.registry import FILTERS
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.platforms import fresh_state
 from steerclear.shield.platforms import layout as L
@@ -34,8 +34,8 @@ def ahead(state, speed=2.0):
     return wanted
 
 
-def guard_for(name, state, team=None, config=CONFIG, **settings):
+def filter_for(name, state, team=None, config=CONFIG, **settings):
     """The filter of a name, for herons."""
     n = state.shape[1]
     fleet = (config, len(state), ("heron",) * n, team or tuple(range(n)), OPEN_WATER)
-    return filters()[name].make(*fleet, settings)
+    return FILTERS[name].make(*fleet, settings)
