@@ -14,7 +14,7 @@ from ...exceptions import LinkError
 from ..clock import Clock
 from ..frame import FieldFrame
 from ..messages import FAILSAFE, PILOT
-from .commands import GUIDED, MODES, TOP_SPEED, AttitudeRoute, Dialogue, Route, interval_request
+from .commands import GUIDED, MODES, TOP_SPEED, AttitudeRoute, Dialogue, Route, command
 from .connection import AUTOPILOT, Endpoint
 from .fence import FenceReader
 from .telemetry import Streams, Telemetry
@@ -48,27 +48,20 @@ _STEERS = {
     "SET_ACTUATOR_CONTROL_TARGET",
 }  # fmt: skip
 _ORDERS = {
-    int(mavlink.MAV_CMD_DO_SET_MODE), int(mavlink.MAV_CMD_COMPONENT_ARM_DISARM), int(mavlink.MAV_CMD_DO_CHANGE_SPEED),
-    int(mavlink.MAV_CMD_NAV_SET_YAW_SPEED), int(mavlink.MAV_CMD_DO_REPOSITION), int(mavlink.MAV_CMD_MISSION_START),
-    int(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH), int(mavlink.MAV_CMD_NAV_LOITER_UNLIM), int(mavlink.MAV_CMD_DO_SET_SERVO),
-    int(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN), int(mavlink.MAV_CMD_DO_MOTOR_TEST),
-    int(mavlink.MAV_CMD_DO_SET_REVERSE), int(mavlink.MAV_CMD_DO_PAUSE_CONTINUE), int(mavlink.MAV_CMD_DO_AUX_FUNCTION),
-    int(mavlink.MAV_CMD_DO_FLIGHTTERMINATION), int(mavlink.MAV_CMD_GUIDED_CHANGE_SPEED),
-    int(mavlink.MAV_CMD_GUIDED_CHANGE_HEADING), int(mavlink.MAV_CMD_DO_GUIDED_LIMITS),
-    int(mavlink.MAV_CMD_DO_SET_MISSION_CURRENT), int(mavlink.MAV_CMD_DO_FENCE_ENABLE),
-}  # fmt: skip
+    int(getattr(mavlink, f"MAV_CMD_{name}"))
+    for name in (
+        *("DO_SET_MODE", "COMPONENT_ARM_DISARM", "DO_CHANGE_SPEED", "NAV_SET_YAW_SPEED", "DO_REPOSITION"),
+        *("MISSION_START", "NAV_RETURN_TO_LAUNCH", "NAV_LOITER_UNLIM", "DO_SET_SERVO", "PREFLIGHT_REBOOT_SHUTDOWN"),
+        *("DO_MOTOR_TEST", "DO_SET_REVERSE", "DO_PAUSE_CONTINUE", "DO_AUX_FUNCTION", "DO_FLIGHTTERMINATION"),
+        *("GUIDED_CHANGE_SPEED", "GUIDED_CHANGE_HEADING", "DO_GUIDED_LIMITS", "DO_SET_MISSION_CURRENT"),
+        "DO_FENCE_ENABLE",
+    )
+}
 
 
 @dataclass(frozen=True)
 class Heartbeat:
-    """What a boat's heartbeat says.
-
-    Attributes:
-        mode: name of the mode.
-        armed: whether motors may turn.
-        unfit: why this link cannot drive it; empty when it can.
-        received_s: on our clock, s.
-    """
+    """What a boat's heartbeat says; ``unfit``: why this link cannot drive it, empty when it can."""
 
     mode: str
     armed: bool
@@ -261,7 +254,7 @@ class Autopilot:
                 if len(self._open) > _OPEN:
                     del self._open[next(iter(self._open))]
         for message_id, interval_us in requests:
-            self.send(interval_request(*self.target, message_id, interval_us))
+            self.send(command(self.target, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message_id, interval_us))
         if asks:
             self.send(mavlink.MAVLink_timesync_message(0, stamp))
         if self.route is not None and now_s - self._recheck_s >= RECHECK_S:

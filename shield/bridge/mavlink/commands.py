@@ -13,8 +13,7 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
-from typing import Any, Protocol
+from typing import Any, ClassVar
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -56,61 +55,39 @@ class Encoded:
     limit_mps: float = math.inf
 
 
-class Route(Protocol):
-    """One way to command heading and speed.
+@dataclass(frozen=True)
+class AttitudeRoute:
+    """SET_ATTITUDE_TARGET: yaw of the quaternion, thrust as a share of WP_SPEED (``top_mps``, > 0), negative astern."""
 
-    Attributes:
-        name: of the message.
-    """
-
-    name: str
+    top_mps: float
+    name: ClassVar[str] = "SET_ATTITUDE_TARGET"
 
     def encode(self, target: tuple[int, int], boot_ms: int, heading_rad: float, speed_mps: float) -> Encoded:
         """The message for a heading (rad clockwise from true north) and a speed (m/s)."""
-
-
-class AttitudeRoute:
-    """SET_ATTITUDE_TARGET: yaw of the quaternion, thrust as a share of WP_SPEED, negative astern.
-
-    Args:
-        top_mps: the autopilot's WP_SPEED, m/s, > 0.
-    """
-
-    name = "SET_ATTITUDE_TARGET"
-
-    def __init__(self, top_mps: float) -> None:
-        self.top_mps = top_mps
-
-    def encode(self, target: tuple[int, int], boot_ms: int, heading_rad: float, speed_mps: float) -> Encoded:
-        """See `Route`."""
         w, z = _float32(math.cos(0.5 * heading_rad)), _float32(math.sin(0.5 * heading_rad))
         thrust = _float32(min(1.0, max(-1.0, speed_mps / self.top_mps)))
-        message = mavlink.MAVLink_set_attitude_target_message(
-            boot_ms, *target, ATTITUDE_MASK, [w, 0.0, 0.0, z], 0.0, 0.0, 0.0, thrust
-        )
+        message = self._message(target, boot_ms, ATTITUDE_MASK, w, z, thrust)
         return Encoded(message, 2.0 * math.atan2(z, w) % (2.0 * math.pi), thrust * self.top_mps, self.top_mps)
 
     def straight_stop(self, target: tuple[int, int], boot_ms: int) -> Any:
         """Stop without turning, for a boat whose heading nobody knows."""
+        return self._message(target, boot_ms, YAW_RATE_MASK, 1.0, 0.0, 0.0)
+
+    def _message(self, target: tuple[int, int], boot_ms: int, mask: int, w: float, z: float, thrust: float) -> Any:
         return mavlink.MAVLink_set_attitude_target_message(
-            boot_ms, *target, YAW_RATE_MASK, [1.0, 0.0, 0.0, 0.0], 0.0, 0.0, 0.0, 0.0
+            boot_ms, *target, mask, [w, 0.0, 0.0, z], 0.0, 0.0, 0.0, thrust
         )
 
 
+@dataclass(frozen=True)
 class VelocityRoute:
-    """SET_POSITION_TARGET_LOCAL_NED, velocity only; cannot go astern.
+    """SET_POSITION_TARGET_LOCAL_NED, velocity only; cannot go astern. None: WP_SPEED cannot be read."""
 
-    Args:
-        top_mps: the autopilot's WP_SPEED, m/s; None when it cannot be read.
-    """
-
-    name = "SET_POSITION_TARGET_LOCAL_NED"
-
-    def __init__(self, top_mps: float | None) -> None:
-        self.top_mps = top_mps
+    top_mps: float | None
+    name: ClassVar[str] = "SET_POSITION_TARGET_LOCAL_NED"
 
     def encode(self, target: tuple[int, int], boot_ms: int, heading_rad: float, speed_mps: float) -> Encoded:
-        """See `Route`."""
+        """The message for a heading (rad clockwise from true north) and a speed (m/s)."""
         top = math.inf if self.top_mps is None else self.top_mps
         speed = min(top, max(CREEP_MPS, speed_mps))
         north, east = _float32(speed * math.cos(heading_rad)), _float32(speed * math.sin(heading_rad))
@@ -121,6 +98,7 @@ class VelocityRoute:
         return Encoded(message, math.atan2(east, north) % (2.0 * math.pi), math.hypot(north, east), top)
 
 
+Route = AttitudeRoute | VelocityRoute
 CAPABILITIES = {
     AttitudeRoute.name: int(mavlink.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET),
     VelocityRoute.name: int(mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED),
@@ -160,7 +138,7 @@ def check_route(route: str) -> str:
     return route
 
 
-def choose_route(boat: str, route: str, abilities: Abilities) -> AttitudeRoute | VelocityRoute:
+def choose_route(boat: str, route: str, abilities: Abilities) -> Route:
     """The first way the autopilot can be commanded in.
 
     Raises:
@@ -187,27 +165,15 @@ def choose_route(boat: str, route: str, abilities: Abilities) -> AttitudeRoute |
     )
 
 
-def mode_request(system_id: int, component: int, mode: str) -> Any:
+def command(target: tuple[int, int], number: int, *values: float) -> Any:
+    """COMMAND_LONG with its first parameters; the others are 0."""
+    return mavlink.MAVLink_command_long_message(*target, number, 0, *values, *[0] * (7 - len(values)))
+
+
+def mode_request(target: tuple[int, int], mode: str) -> Any:
     """The command that asks for a mode."""
     number = next(number for number, name in MODES.items() if name == mode)
-    return mavlink.MAVLink_command_long_message(
-        system_id, component, mavlink.MAV_CMD_DO_SET_MODE, 0,
-        mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, number, 0, 0, 0, 0, 0,
-    )  # fmt: skip
-
-
-def arm_request(system_id: int, component: int) -> Any:
-    """The command that asks to arm, all checks on."""
-    return mavlink.MAVLink_command_long_message(
-        system_id, component, mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, 1, 0, 0, 0, 0, 0, 0
-    )
-
-
-def interval_request(system_id: int, component: int, message_id: int, interval_us: float) -> Any:
-    """The command that asks for a message at an interval."""
-    return mavlink.MAVLink_command_long_message(
-        system_id, component, mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, 0, message_id, interval_us, 0, 0, 0, 0, 0
-    )
+    return command(target, mavlink.MAV_CMD_DO_SET_MODE, mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, number)
 
 
 class Patience:
@@ -238,11 +204,6 @@ class Dialogue:
     """Questions to one autopilot and its answers: commands, parameters, what it can do, what it says.
 
     Answers are taken in on the link's thread; questions are asked, and waited for, on the caller's.
-
-    Args:
-        target: system and component of the autopilot.
-        send: sends a message, never waits.
-        clock: the loop's.
 
     Attributes:
         changed: notified whenever something came in; its lock guards all a link knows of its boat.
@@ -349,24 +310,20 @@ class Dialogue:
                 if not unknown and needed in self.parameters and self.version is not None:
                     return
                 answers = self._answers[needed]
+
+            def is_told(answers: int = answers) -> bool:
+                return self.version is not None and self._answers[needed] > answers
+
             if self.version is None:
-                self._send(
-                    mavlink.MAVLink_command_long_message(
-                        *self._target, mavlink.MAV_CMD_REQUEST_MESSAGE, 0,
-                        mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION, 0, 0, 0, 0, 0, 0,
-                    )
-                )  # fmt: skip
+                number = mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION
+                self._send(command(self._target, mavlink.MAV_CMD_REQUEST_MESSAGE, number))
             for name in (*unknown, needed):
                 self.ask_parameter(name)
-            self.wait(partial(self._is_told, needed, answers), patience.part(LEARN_AGAIN_S))
+            self.wait(is_told, patience.part(LEARN_AGAIN_S))
             self.wait(
                 lambda: self.version is not None and all(name in self.parameters for name in (needed, *others)),
                 patience.part(_ROUND_S),
             )
-
-    def _is_told(self, needed: str, answers: int) -> bool:
-        """Whether the version is known, and a parameter was answered more often than that."""
-        return self.version is not None and self._answers[needed] > answers
 
     def ask_parameter(self, name: str) -> None:
         """Ask for one parameter."""

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import logging
 import os
-import selectors
 import threading
 import time
 from collections import Counter, OrderedDict
 from collections.abc import Callable
+from multiprocessing.connection import wait
 from typing import Any, Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -60,15 +60,11 @@ class Codec:
     """Messages to bytes and back: one sender's numbering and signing, and what is refused of what comes in.
 
     Radios and routers reflect: what we sent comes back. By its ids alone it cannot be told from another program that
-    took the same ids, and that one would be a second commander; by its bytes it can.
-
-    Args:
-        system: our system id; ArduPilot counts heartbeats of 255 for its ground station failsafe.
-        component: our component id.
-        signing: sign what goes out and refuse what comes in unsigned, wrongly signed or again.
+    took the same ids, and that one would be a second commander; by its bytes it can. ArduPilot counts heartbeats of
+    system 255 for its ground station failsafe.
 
     Attributes:
-        source: our ids.
+        source: our system and component.
         signs: whether signing is on.
     """
 
@@ -281,11 +277,7 @@ class Endpoint:
     def _run(self) -> None:
         while not self._ending.is_set():
             try:
-                with selectors.DefaultSelector() as selector:
-                    selector.register(self._wake[0], selectors.EVENT_READ)
-                    if self._wire.fileno() >= 0:
-                        selector.register(self._wire.fileno(), selectors.EVENT_READ)
-                    selector.select(_POLL_S)
+                wait([end for end in (self._wake[0], self._wire.fileno()) if end >= 0], _POLL_S)
                 self._drain()
                 self._tick()
             except Exception:  # whatever a receiver or the wire does, the other boats here must still be heard

@@ -5,19 +5,21 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from .commands import command
+
 MISSION = int(mavlink.MAV_MISSION_TYPE_FENCE)
-POLYGONS = {
-    int(mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION): True,
-    int(mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION): False,
+ZONES = {
+    int(mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION): (True, False),
+    int(mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION): (False, False),
+    int(mavlink.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION): (True, True),
+    int(mavlink.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION): (False, True),
 }
-CIRCLES = {
-    int(mavlink.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION): True,
-    int(mavlink.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION): False,
-}
+"""Whether boats must stay inside, and whether it is a circle, by the command of an item."""
 MOST_ITEMS = 500
 
 Point = tuple[float, float]
@@ -39,12 +41,7 @@ class FenceZone:
 
 
 class FenceReader:
-    """Downloads an autopilot's fence and its home; messages come in on the link's thread.
-
-    Args:
-        target: system and component of the autopilot.
-        send: sends a message, never waits.
-    """
+    """Downloads an autopilot's fence and its home; messages come in on the link's thread."""
 
     def __init__(self, target: tuple[int, int], send: Callable[[Any], bool]) -> None:
         self._target, self._send = target, send
@@ -69,9 +66,8 @@ class FenceReader:
         with self._lock:
             count, known = self._count, set(self._items)
         if self.home_deg is None:
-            number = mavlink.MAVLINK_MSG_ID_HOME_POSITION
-            request = mavlink.MAV_CMD_REQUEST_MESSAGE
-            self._send(mavlink.MAVLink_command_long_message(*self._target, request, 0, number, 0, 0, 0, 0, 0, 0))
+            home = mavlink.MAVLINK_MSG_ID_HOME_POSITION
+            self._send(command(self._target, mavlink.MAV_CMD_REQUEST_MESSAGE, home))
         if count is None:
             self._send(mavlink.MAVLink_mission_request_list_message(*self._target, mission_type=MISSION))
             return
@@ -90,16 +86,13 @@ class FenceReader:
         with self._lock:
             if self._count is None or len(self._items) != self._count or self._count > MOST_ITEMS:
                 return None
-            items = [self._items[number] for number in range(self._count)]
-        zones, begin = [], 0
-        while begin < len(items):
-            item = items[begin]
-            place = item.x / 1e7, item.y / 1e7
-            if item.command in CIRCLES:
-                zones.append(FenceZone(CIRCLES[item.command], (place,), float(item.param1)))
-            elif item.command in POLYGONS:
-                corners = items[begin : begin + max(1, int(item.param1))]
-                zones.append(FenceZone(POLYGONS[item.command], tuple((c.x / 1e7, c.y / 1e7) for c in corners)))
-                begin += len(corners) - 1
-            begin += 1
+            items = iter([self._items[number] for number in range(self._count)])
+        zones = []
+        for item in items:
+            inside, is_circle = ZONES.get(item.command, (False, None))
+            if is_circle is None:
+                continue
+            corners = [item] if is_circle else [item, *islice(items, max(0, int(item.param1) - 1))]
+            places = tuple((corner.x / 1e7, corner.y / 1e7) for corner in corners)
+            zones.append(FenceZone(inside, places, float(item.param1) if is_circle else 0.0))
         return tuple(zones)

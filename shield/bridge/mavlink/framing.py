@@ -20,9 +20,7 @@ _BAD = -2
 class Framer:
     """Cuts what one sender sends into frames.
 
-    Args:
-        datagrams: bytes come in packets that normally hold whole frames, so that a frame never waits for the rest of a
-            damaged one before it.
+    Where bytes come as datagrams, which normally hold whole frames, a frame never waits for the rest of a damaged one.
 
     Attributes:
         damaged: places where a frame began and its checksum or flags were wrong.

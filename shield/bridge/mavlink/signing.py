@@ -145,12 +145,7 @@ class SigningClock:
 
 
 class SignatureCheck:
-    """Verifies frames with one key; each sender's time stamps must rise.
-
-    Args:
-        key: 32 bytes.
-        clock: ours, for senders heard for the first time.
-    """
+    """Verifies frames with one key; each sender's time stamps must rise."""
 
     def __init__(self, key: bytes, clock: SigningClock) -> None:
         self._key = key

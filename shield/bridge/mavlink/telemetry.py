@@ -121,11 +121,7 @@ def _fault_of(message: Any) -> tuple[str, str]:
 
 
 class Streams:
-    """Asks the autopilot for messages at a rate, and believes only what arrives.
-
-    Args:
-        rate_hz: of position and attitude; at most 40, which is what autopilots give.
-    """
+    """Asks for messages, position and attitude at ``rate_hz`` (40 at most), and believes only what arrives."""
 
     def __init__(self, rate_hz: float) -> None:
         self.needed: Mapping[int, float] = {POSITION: rate_hz, ATTITUDE: rate_hz}
@@ -185,10 +181,7 @@ class Streams:
 
 
 class Telemetry:
-    """Not thread-safe: its owner holds a lock.
-
-    Args:
-        frame: of the field.
+    """What a boat's messages say in the field's frame. Not thread-safe: its owner holds a lock.
 
     Attributes:
         clock: of the boat.

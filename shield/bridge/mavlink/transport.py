@@ -47,23 +47,6 @@ class Address:
     def __str__(self) -> str:
         return f"{self.kind}:{self.host}:{self.number}"
 
-    def error(self, error: OSError) -> LinkError:
-        """What went wrong when the wire was opened, and what to do."""
-        remedy = _REMEDIES.get(error.errno or 0, "check the address and the network")
-        return LinkError(f"cannot open link {self} ({error.strerror or error}); {remedy}")
-
-    def resolve(self, kind: int) -> tuple[int, Peer]:
-        """Address family, and host and port in numbers.
-
-        Raises:
-            LinkError: nobody knows the host.
-        """
-        try:
-            family, _, _, _, place = socket.getaddrinfo(self.host, self.number, type=kind)[0]
-        except OSError as error:
-            raise LinkError(f"link {self}: there is no host {self.host!r} ({error.strerror}); correct it") from None
-        return family, (str(place[0]), int(place[1]))
-
 
 def parse_address(text: str) -> Address:
     """Read ``udpin:127.0.0.1:14550``, ``tcp:HOST:PORT``, ``serial:/dev/ttyUSB0:57600`` and the like.
@@ -88,7 +71,7 @@ def parse_address(text: str) -> Address:
 
 
 class Wire:
-    """One wire; this class is a stream with one end that is never there.
+    """One wire; the classes below say how bytes get on and off it.
 
     Args:
         address: where it is.
@@ -99,16 +82,18 @@ class Wire:
     """
 
     datagrams = False
-    many = False
 
     def __init__(self, address: Address) -> None:
-        self.address = address
+        self.address, self.many = address, address.kind == "udpin"
+        self._end: Any = None  # a socket, or a serial port
+        self._listener: socket.socket | None = None
         self._pending = b""
 
     @property
     def port(self) -> int:
-        """Our own port; 0 while there is none."""
-        return 0
+        """Our own port, where we listen or, over UDP, send from; else 0."""
+        listens = self._end if self.datagrams else self._listener
+        return 0 if listens is None else int(listens.getsockname()[1])
 
     def open(self, timeout_s: float = _DIAL_S) -> None:
         """Open it, or open it again after it was lost.
@@ -120,11 +105,15 @@ class Wire:
 
     def fileno(self) -> int:
         """What to wait on; -1 while it is not open."""
-        raise NotImplementedError
+        opened = self._listener if self._end is None else self._end
+        return -1 if opened is None else int(opened.fileno())
 
     def close(self) -> None:
         """Give it back."""
-        raise NotImplementedError
+        self._drop()
+        if self._listener is not None:
+            self._listener.close()
+            self._listener = None
 
     def receive(self) -> tuple[bytes, Peer] | None:
         """What came in; None when there is nothing.
@@ -157,13 +146,37 @@ class Wire:
         """Some bytes; none of them: the end is gone; None: it is not there."""
         raise NotImplementedError
 
+    def _put(self, data: bytes) -> int | None:
+        """Hand bytes over; how many were taken."""
+        raise NotImplementedError
+
     def _write(self, data: bytes) -> int:
         """How many bytes left; 0: the wire is full, or lost: then the reader finds out and opens it again."""
-        raise NotImplementedError
+        try:
+            return 0 if self._end is None else int(self._put(data) or 0)
+        except OSError:
+            return 0
 
     def _drop(self) -> None:
         """Give the connection back."""
-        self.close()
+        if self._end is not None:
+            with contextlib.suppress(OSError):
+                self._end.close()
+        self._end, self._pending = None, b""
+
+    def _failed(self, error: OSError) -> LinkError:
+        """What went wrong when the wire was opened, and what to do."""
+        remedy = _REMEDIES.get(error.errno or 0, "check the address and the network")
+        return LinkError(f"cannot open link {self.address} ({error.strerror or error}); {remedy}")
+
+    def _socket(self, kind: int) -> tuple[socket.socket, Peer]:
+        """A socket of the address's family, and host and port in numbers."""
+        try:
+            family, _, _, _, place = socket.getaddrinfo(self.address.host, self.address.number, type=kind)[0]
+        except OSError as error:
+            host = self.address.host
+            raise LinkError(f"link {self.address}: there is no host {host!r} ({error.strerror}); correct it") from None
+        return socket.socket(family, kind), (str(place[0]), int(place[1]))
 
 
 class UdpWire(Wire):
@@ -174,80 +187,47 @@ class UdpWire(Wire):
 
     datagrams = True
 
-    def __init__(self, address: Address) -> None:
-        super().__init__(address)
-        self._socket: socket.socket | None = None
-        self.many = address.kind == "udpin"
-
-    @property
-    def port(self) -> int:
-        """Our own port; 0 while closed."""
-        return 0 if self._socket is None else int(self._socket.getsockname()[1])
-
     def open(self, timeout_s: float = _DIAL_S) -> None:
         """Bind, or choose a peer; see `Wire`."""
         self.close()
-        family, place = self.address.resolve(socket.SOCK_DGRAM)
-        made = socket.socket(family, socket.SOCK_DGRAM)
+        made, place = self._socket(socket.SOCK_DGRAM)
         try:
             made.setblocking(False)
             made.bind(place) if self.many else made.connect(place)
         except OSError as error:
             made.close()
-            raise self.address.error(error) from None
-        self._socket = made
-
-    def fileno(self) -> int:
-        """See `Wire`."""
-        return -1 if self._socket is None else self._socket.fileno()
+            raise self._failed(error) from None
+        self._end = made
 
     def receive(self) -> tuple[bytes, Peer] | None:
         """One datagram; see `Wire`."""
-        if self._socket is None:
+        if self._end is None:
             return None
         try:
-            data, peer = self._socket.recvfrom(_DATAGRAM)
+            data, peer = self._end.recvfrom(_DATAGRAM)
         except (BlockingIOError, InterruptedError, ConnectionError):
             return None  # ConnectionError: the peer's machine says nobody listens there; it may yet
         return data, (str(peer[0]), int(peer[1]))
 
     def send(self, data: bytes, peer: Peer | None) -> bool:
         """One datagram; see `Wire`."""
-        if self._socket is None or (self.many and peer is None):
+        if self._end is None or (self.many and peer is None):
             return False
         try:
-            sent = self._socket.sendto(data, peer) if self.many and peer is not None else self._socket.send(data)
+            return len(data) == (self._end.sendto(data, peer) if self.many else self._end.send(data))
         except OSError:
             return False
-        return sent == len(data)
-
-    def close(self) -> None:
-        """See `Wire`."""
-        if self._socket is not None:
-            self._socket.close()
-            self._socket = None
 
 
 class TcpWire(Wire):
     """TCP. ``tcp`` dials, ``tcpin`` waits to be dialled, by one peer at a time."""
-
-    def __init__(self, address: Address) -> None:
-        super().__init__(address)
-        self._listener: socket.socket | None = None
-        self._socket: socket.socket | None = None
-
-    @property
-    def port(self) -> int:
-        """The port we listen at; 0 when we dial."""
-        return 0 if self._listener is None else int(self._listener.getsockname()[1])
 
     def open(self, timeout_s: float = _DIAL_S) -> None:
         """Dial or listen; see `Wire`."""
         self._drop()
         if self._listener is not None:
             return
-        family, place = self.address.resolve(socket.SOCK_STREAM)
-        made = socket.socket(family, socket.SOCK_STREAM)
+        made, place = self._socket(socket.SOCK_STREAM)
         try:
             if self.address.kind == "tcp":
                 made.settimeout(timeout_s)
@@ -261,51 +241,26 @@ class TcpWire(Wire):
                 self._listener = made
         except OSError as error:
             made.close()
-            raise self.address.error(error) from None
+            raise self._failed(error) from None
 
     def _take(self, made: socket.socket) -> None:
         made.setblocking(False)
         made.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         made.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _WAITING)  # old commands must not queue up for seconds
-        self._socket, self._pending = made, b""
-
-    def fileno(self) -> int:
-        """See `Wire`."""
-        chosen = self._socket or self._listener
-        return -1 if chosen is None else chosen.fileno()
+        self._end, self._pending = made, b""
 
     def _read(self) -> bytes | None:
-        if self._socket is None and self._listener is not None:
+        if self._end is None and self._listener is not None:
             with contextlib.suppress(BlockingIOError, InterruptedError, ConnectionError):
                 self._take(self._listener.accept()[0])
-        return None if self._socket is None else self._socket.recv(_CHUNK)
+        return None if self._end is None else self._end.recv(_CHUNK)
 
-    def _write(self, data: bytes) -> int:
-        try:
-            return 0 if self._socket is None else self._socket.send(data)
-        except OSError:
-            return 0
-
-    def _drop(self) -> None:
-        if self._socket is not None:
-            self._socket.close()
-            self._socket = None
-        self._pending = b""
-
-    def close(self) -> None:
-        """See `Wire`."""
-        self._drop()
-        if self._listener is not None:
-            self._listener.close()
-            self._listener = None
+    def _put(self, data: bytes) -> int | None:
+        return self._end.send(data)
 
 
 class SerialWire(Wire):
     """A serial port with one autopilot or radio at its end: 8 bits, no parity, no flow control."""
-
-    def __init__(self, address: Address) -> None:
-        super().__init__(address)
-        self._port: Any = None
 
     def open(self, timeout_s: float = _DIAL_S) -> None:
         """Open the device; see `Wire`."""
@@ -318,33 +273,17 @@ class SerialWire(Wire):
             known = [rate for rate in serial.Serial.BAUDRATES if rate >= 9600]
             raise LinkError(f"link {self.address}: no baud rate {self.address.number}; give one of {known}")
         try:
-            self._port = serial.Serial(self.address.host, self.address.number, timeout=0, write_timeout=0)
+            self._end = serial.Serial(self.address.host, self.address.number, timeout=0, write_timeout=0)
         except OSError as error:  # SerialException is one; its text holds the system's
             if error.errno in _REMEDIES:
-                raise self.address.error(OSError(error.errno, os.strerror(error.errno or 0))) from None
+                raise self._failed(OSError(error.errno, os.strerror(error.errno or 0))) from None
             raise LinkError(f"link {self.address}: that is no serial port ({error}); name one") from None
-        self._pending = b""
-
-    def fileno(self) -> int:
-        """See `Wire`."""
-        return -1 if self._port is None else int(self._port.fileno())
 
     def _read(self) -> bytes | None:
-        return None if self._port is None else self._port.read(_CHUNK) or None  # one that is gone raises
+        return None if self._end is None else self._end.read(_CHUNK) or None  # one that is gone raises
 
-    def _write(self, data: bytes) -> int:
-        try:
-            return 0 if self._port is None else int(self._port.write(data) or 0)
-        except OSError:
-            return 0
-
-    def close(self) -> None:
-        """See `Wire`."""
-        if self._port is not None:
-            with contextlib.suppress(OSError):
-                self._port.close()
-            self._port = None
-        self._pending = b""
+    def _put(self, data: bytes) -> int | None:
+        return self._end.write(data)
 
 
 def make_wire(address: Address) -> Wire:

@@ -23,9 +23,9 @@ from .commands import (
     AttitudeRoute,
     Encoded,
     Patience,
-    arm_request,
     check_route,
     choose_route,
+    command,
     mode_request,
 )
 from .connection import Endpoint
@@ -164,8 +164,9 @@ class MavlinkLink(Link):
             raise LinkError(f"boat {self.boat}: not connected; call connect first")
         dialogue.learn(TOP_SPEED, ASKED, patience.part(_LEARN_S))
         boat.route = choose_route(self.boat, self._wanted_route, dialogue.abilities)
-        self._reach(mode_request(*boat.target, GUIDED), lambda: boat.mode == GUIDED, "GUIDED", patience)
-        self._reach(arm_request(*boat.target), lambda: boat.is_armed, "arming", patience)
+        self._reach(mode_request(boat.target, GUIDED), lambda: boat.mode == GUIDED, "GUIDED", patience)
+        arm = command(boat.target, mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1)  # all checks on
+        self._reach(arm, lambda: boat.is_armed, "arming", patience)
         with dialogue.changed:  # ours from now on, unless a pilot took it since, or nobody wants it any more
             taken = boat.released, boat.released_by
             self._check_wanted(patience)
@@ -336,7 +337,7 @@ class MavlinkLink(Link):
             stopped = boat.dialogue.wait(is_still, patience.part(_RESEND_S))
         patience = Patience(self._clock, HOLD_S)
         while not (held or patience.is_over):
-            boat.dialogue.command(mode_request(*boat.target, HOLD), patience.part(1.0))
+            boat.dialogue.command(mode_request(boat.target, HOLD), patience.part(1.0))
             held = boat.dialogue.wait(lambda: boat.mode == HOLD, patience.part(1.0))
         is_known = self._clock.now_s() - seen.velocity_s < 5.0
         speed = f"speed {math.hypot(*seen.velocity_mps):.1f} m/s" if is_known else "speed unknown"

@@ -92,24 +92,23 @@ def test_speeds_are_limited_to_what_the_boat_takes_and_said_so():
         assert link.send(0.0, -1e9).speed_mps == pytest.approx(-2.0)
 
 
-def test_a_silent_boat_is_told_from_one_that_is_refused():
-    with (
-        linked(prepared=False, speaks=False) as (_, link),
-        pytest.raises(LinkError, match=r"no heartbeat of system id 1 on udpin.*check power, radio, address"),
-    ):
-        link.connect(0.3)
-    with (
-        linked(prepared=False, signing=Signing(bytes(32))) as (_, link),
-        pytest.raises(LinkError, match=r"refused: .* unsigned; give both sides the same key"),
-    ):
-        link.connect(0.6)
-
-
-def test_a_boat_with_another_id_is_named():
-    with linked(prepared=False) as (boat, link):
-        boat.mav.srcSystem = 42
-        with pytest.raises(LinkError, match=r"no heartbeat of system id 1 .*heard system ids 42 there; check .*SYSID"):
-            link.connect(2.0)
+@pytest.mark.parametrize(
+    ("boat", "seconds", "words"),
+    [
+        ({"speaks": False}, 0.3, r"no heartbeat of system id 1 on udpin.*check power, radio, address"),
+        ({"signing": Signing(bytes(32))}, 0.6, r"refused: .* unsigned; give both sides the same key"),
+        ({"own_id": 42}, 2.0, r"no heartbeat of system id 1 .*heard system ids 42 there; check .*SYSID"),
+        ({"vehicle": mavlink.MAV_TYPE_QUADROTOR}, 20.0, "it is a MAV_TYPE_QUADROTOR, not a boat"),
+        ({"autopilot": mavlink.MAV_AUTOPILOT_PX4}, 20.0, "its autopilot is MAV_AUTOPILOT_PX4, not ArduPilot"),
+        ({"rates_given": False}, 1.0, r"sends GLOBAL_POSITION_INT at 0.0 of 10 Hz, ATTITUDE .*lower rate_hz"),
+    ],
+)
+def test_a_boat_that_cannot_be_connected_to_is_refused_with_the_reason(boat, seconds, words):
+    own_id = boat.pop("own_id", 1)
+    with linked(prepared=False, **boat) as (fake, link):
+        fake.mav.srcSystem = own_id
+        with pytest.raises(LinkError, match=words):
+            link.connect(seconds)
 
 
 def test_parameters_nobody_asked_for_are_left():
@@ -122,43 +121,22 @@ def test_parameters_nobody_asked_for_are_left():
         assert "WHATEVER" not in link.health().parameters
 
 
-def test_signed_boats_are_steered():
-    key = bytes(range(32))
-    with linked(signing=Signing(key), boat_key=key) as (boat, link):
-        assert link.send(0.0, 1.0).delivered
-        assert wait_for(lambda: boat.targets)
-        assert link.health().signs
-
-
-def test_a_boat_that_is_none_is_refused():
-    with (
-        linked(prepared=False, vehicle=mavlink.MAV_TYPE_QUADROTOR) as (_, link),
-        pytest.raises(LinkError, match="it is a MAV_TYPE_QUADROTOR, not a boat"),
-    ):
+@pytest.mark.parametrize(
+    ("boat", "words"),
+    [
+        ({"refuses_arming": "PreArm: Compass"}, r"blue_1 refuses arming \(failed\): .*PreArm: Compass; put that"),
+        ({"refuses_mode": "GUIDED failed: requires position"}, r"refuses GUIDED .*requires position"),
+        ({"parameters": {"WP_SPEED": 0.0}}, "WP_SPEED is 0"),
+    ],
+)
+def test_a_refusal_to_be_prepared_carries_the_boats_own_words(boat, words):
+    with linked(prepared=False, **boat) as (fake, link):
         link.connect(20.0)
-    with (
-        linked(prepared=False, autopilot=mavlink.MAV_AUTOPILOT_PX4) as (_, link),
-        pytest.raises(LinkError, match="its autopilot is MAV_AUTOPILOT_PX4, not ArduPilot"),
-    ):
-        link.connect(20.0)
-
-
-def test_streams_that_do_not_come_are_named():
-    with (
-        linked(prepared=False, rates_given=False) as (_, link),
-        pytest.raises(LinkError, match=r"sends GLOBAL_POSITION_INT at 0.0 of 10 Hz, ATTITUDE .*lower rate_hz"),
-    ):
-        link.connect(1.0)
-
-
-def test_a_refusal_to_arm_carries_the_boats_own_words():
-    with linked(prepared=False, refuses_arming="PreArm: Compass not calibrated") as (boat, link):
-        link.connect(20.0)
-        with pytest.raises(LinkRefused, match=r"blue_1 refuses arming \(failed\): .*Compass not calibrated; put that"):
+        with pytest.raises(LinkRefused, match=words):
             link.prepare(1.5)
-        assert not boat.armed
-        arms = [m for m in boat.heard if m.get_type() == "COMMAND_LONG" and m.command == 400]
-        assert arms
+        assert not fake.armed
+        arms = [m for m in fake.heard if m.get_type() == "COMMAND_LONG" and m.command == 400]
+        assert bool(arms) == ("refuses_arming" in boat)
         assert all(m.param2 == 0 for m in arms), "never forced"
 
 
@@ -180,24 +158,13 @@ def test_a_boat_still_booting_is_asked_again():
         assert link.read().ready
 
 
-def test_a_refused_mode_and_no_answer_at_all_are_told_apart():
-    with linked(prepared=False, refuses_mode="Mode change to GUIDED failed: requires position") as (_, link):
-        link.connect(20.0)
-        with pytest.raises(LinkRefused, match=r"refuses GUIDED .*requires position"):
-            link.prepare(1.0)
+def test_no_answer_at_all_is_told_from_a_refusal():
     with linked(prepared=False) as (boat, link):
         link.connect(20.0)
         link.learn(20.0)
         boat.answers = False
         with pytest.raises(LinkError, match="no answer to the request for GUIDED; check the radio"):
             link.prepare(1.0)
-
-
-def test_a_boat_that_would_not_move_is_refused():
-    with linked(prepared=False, parameters={"WP_SPEED": 0.0}) as (_, link):
-        link.connect(20.0)
-        with pytest.raises(LinkRefused, match="WP_SPEED is 0"):
-            link.prepare(10.0)
 
 
 def test_preparing_without_connecting_is_refused():
