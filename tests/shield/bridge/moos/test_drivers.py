@@ -5,9 +5,9 @@ import math
 import pytest
 from steerclear.shield.bridge.frame import FieldFrame
 from steerclear.shield.bridge.messages import BoatReading
+from steerclear.shield.bridge.moos.checks import mission_faults, parse_mission
 from steerclear.shield.bridge.moos.drivers import Drivers
 from steerclear.shield.bridge.moos.gates import HelmGate, PidGate
-from steerclear.shield.bridge.moos.mission import mission_faults, parse_mission
 from steerclear.shield.bridge.moos.wire import Message
 from steerclear.shield.platforms import fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L
