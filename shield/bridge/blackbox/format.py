@@ -15,7 +15,6 @@ from ...commands import Commands
 from ...decision import Decisions, Reason
 from ...exceptions import LogError, SteerclearError
 from ...fleet import Fleet
-from ...jit import Array
 from ...platforms import PLATFORMS, Gains, Platform
 from ...platforms import layout as L
 from ...surroundings import Surroundings
@@ -281,7 +280,7 @@ def _tick(record: TickRecord, platforms: Mapping[str, Platform]) -> Tick:
     )
 
 
-def _arrays(rows: list[BoatRecord], owner: type) -> dict[str, Array]:
+def _arrays(rows: list[BoatRecord], owner: type) -> dict[str, Any]:
     """Arrays of a `Fleet` or of `Decisions`, as far as the log has them."""
     return {
         attribute: _array(rows, name)
@@ -290,7 +289,7 @@ def _arrays(rows: list[BoatRecord], owner: type) -> dict[str, Array]:
     }
 
 
-def _array(rows: list[BoatRecord], name: str) -> Array:
+def _array(rows: list[BoatRecord], name: str) -> Any:
     _, _, kind, shape = COLUMNS[name]
     values = [getattr(row, name) for row in rows]
     if UNSET in values or any(shape and len(value) != shape[0] for value in values):
