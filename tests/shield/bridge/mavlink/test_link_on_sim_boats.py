@@ -43,17 +43,19 @@ class Lake:
         self.link = MavlinkLink("blue_1", self.endpoint, 7, FRAME, self.clock, rate_hz=10.0)
         self.command = None
         self.prepared = prepared
+        self.working = threading.Lock()  # whoever works as the loop does takes no time, even where code is compiled
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
 
     def _run(self):
         sent_s = 0.0
         while not self._ending.is_set():
-            self.clock.sleep_until(self.clock.now_s() + STEP_S)
-            self.fleet.advance(STEP_S)
-            if self.command is not None and self.clock.now_s() - sent_s >= 0.2:
-                sent_s = self.clock.now_s()
-                self.link.send(*self.command)
+            with self.working:
+                self.clock.sleep_until(self.clock.now_s() + STEP_S)
+                self.fleet.advance(STEP_S)
+                if self.command is not None and self.clock.now_s() - sent_s >= 0.2:
+                    sent_s = self.clock.now_s()
+                    self.link.send(*self.command)
             time.sleep(LISTEN_S)
 
     def __enter__(self):
@@ -181,17 +183,18 @@ class Tracked:
 
     def age_s(self):
         """Age of what is believed, after another turn if one is due, s."""
-        now_s = self.lake.clock.now_s()
-        if now_s - self.turned_s >= 0.099:
-            self.turned_s = now_s
-            readings = {"blue_1": self.lake.link.read()}
-            self.tracker.update(now_s, readings, [])
-            self.monitor.update(self.tracker.own_rows(), readings)
-            command = (math.nan, math.nan) if self.lake.command is None else self.lake.command
-            sent = {"blue_1": Sent("blue_1", now_s, *command, "", self.lake.command is not None)}
-            self.tracker.sent(now_s, sent)
-            self.monitor.sent(sent)
-            self.said += self.tracker.faults.values()
+        with self.lake.working:
+            now_s = self.lake.clock.now_s()
+            if now_s - self.turned_s >= 0.099:
+                self.turned_s = now_s
+                readings = {"blue_1": self.lake.link.read()}
+                self.tracker.update(now_s, readings, [])
+                self.monitor.update(self.tracker.own_rows(), readings)
+                command = (math.nan, math.nan) if self.lake.command is None else self.lake.command
+                sent = {"blue_1": Sent("blue_1", now_s, *command, "", self.lake.command is not None)}
+                self.tracker.sent(now_s, sent)
+                self.monitor.sent(sent)
+                self.said += self.tracker.faults.values()
         return self.tracker.navigation_age_s("blue_1")
 
     def off_s(self):
