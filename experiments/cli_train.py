@@ -11,19 +11,18 @@ from shutil import copyfile
 from typing import Annotated, Any
 
 import typer
-from steerclear.policies.entrants.learned.network import Network
+from steerclear.policies.entrants.learned.network import Network, read_weights, write_weights
 from steerclear.policies.entrants.learned.sb3_file import read_sb3
-from steerclear.policies.entrants.learned.weights_file import read_weights, write_weights
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.extras import install_command
 
 from . import cli_options as o
 from .cli_files import check_ending
 from .console import Interrupted, bars, command, progress, say, warn
+from .entries.wrap import write_submission
 from .result_files import NEW, lock_folder, make_folder
 from .runner import RESULTS_FILE
-from .training.config_file import read_config
-from .training.export import write_submission
+from .training.config import read_config
 from .workers import processes_of
 
 Config = Annotated[Path, typer.Argument(metavar="CONFIG.yaml", help="What to train; see docs/train.md.")]

@@ -24,7 +24,7 @@ from .reach.pages import played_page, sets_page, tables_page
 from .report import Report, Section, game_report, made_of
 from .tables import Table, interval_text
 from .tournament_pages import write_markdown
-from .training.study_page import learning_page
+from .training.study import learning_page
 
 Results = Mapping[str, Any]
 Page = tuple[str, str, list[Path]]

@@ -12,10 +12,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-PACKAGES = (
-    *("steerclear", "numpy", "scipy", "numba", "qpsolvers", "daqp", "osqp", "gymnasium", "pettingzoo", "torch"),
-    "kairos-planner",
-)
+PACKAGES = ("steerclear", "numpy", "scipy", "numba", "qpsolvers", "daqp", "osqp", "gymnasium", "pettingzoo", "torch")
 SOURCES = ("*.py", "*.npz", "shipped/*.yaml")
 """Code, tables and weights, boats."""
 NO_GAME = (

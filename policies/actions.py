@@ -1,15 +1,18 @@
-"""Checks one answer of foreign code and turns it into a command; the conversion itself is the game's own."""
+"""What a team of somebody's own code relies on of its game, whoever plays that, and the checks of its answers."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from steerclear.shield.arrays import NoNumbersError, numbers
-from steerclear.shield.exceptions import GameError, PolicyError
+from steerclear.shield.exceptions import ConfigError, GameError, PolicyError
+from steerclear.shield.jit import Array, IntArray
+from steerclear.shield.platforms import Platform, get_platform
 from steerclear.shield.wrappers.actions import short
-
-from .games import SeenGame, seen_game
+from steerclear.shield.wrappers.readers import reader_of
 
 HOLD = (0.0, 0.0)
 """Action of a boat that gave no usable answer: speed 0, heading as it is."""
@@ -17,6 +20,73 @@ MAX_SPEED_FACTOR = 10.0
 """A speed beyond this many times the boat's top speed is taken for an error, not for a wish to be clipped."""
 MAX_HEADING_DEG = 360.0
 """A relative heading beyond this is taken for an error."""
+Fault = tuple[str, str]
+"""What is wrong with an answer: kind, explanation."""
+
+
+@dataclass(frozen=True)
+class SeenGame:
+    """One game, whoever plays it.
+
+    Attributes:
+        agent_ids: names of all boats.
+        team: (n,) team of each.
+        platforms: each boat's platform, or its name.
+        agent_radius_m: (n,) radius of each, m.
+        decision_s: time from decision to decision, s.
+        n_obs: length of an observation; 0: they are no arrays.
+        commands: (n, 2) speed m/s and relative heading deg of actions by boat, as the game plays them.
+    """
+
+    agent_ids: tuple[str, ...]
+    team: IntArray
+    platforms: tuple[str | Platform, ...]
+    agent_radius_m: tuple[float, ...]
+    decision_s: float
+    n_obs: int
+    commands: Callable[[Mapping[str, Any]], Array]
+
+    @property
+    def top_speed_mps(self) -> dict[str, float]:
+        """Top speed of each boat, m/s."""
+        kinds = map(get_platform, self.platforms)
+        return {name: float(kind.max_speed_mps) for name, kind in zip(self.agent_ids, kinds, strict=True)}
+
+    def check_team(self, agent_ids: Sequence[str]) -> None:
+        """Check that these are boats of one team.
+
+        Raises:
+            PolicyError: none, unknown or repeated boats, or boats of both teams.
+        """
+        if not agent_ids or len(set(agent_ids)) != len(agent_ids) or not set(agent_ids) <= set(self.agent_ids):
+            raise PolicyError(f"agent_ids are {list(agent_ids)}; give different ones of {', '.join(self.agent_ids)}")
+        if len({int(self.team[self.agent_ids.index(name)]) for name in agent_ids}) != 1:
+            raise PolicyError(f"agent_ids {list(agent_ids)} are of both teams; one policy plays one team")
+
+
+def seen_game(env: Any) -> SeenGame:
+    """The game that an environment, or a wrapper round one, plays.
+
+    Raises:
+        PolicyError: nobody reads it.
+    """
+    try:
+        reader = reader_of(env)
+        facts, fleet = reader.facts(), reader.fleet(0, False)
+    except ConfigError as error:
+        raise PolicyError(f"{error} (a policy of your own plays in any game that a GameReader reads)") from None
+    first, space = reader.agent_ids[0], getattr(env, "observation_space", None)
+    space = space(first) if callable(space) else (getattr(env, "observation_spaces", None) or {}).get(first)
+    shape = tuple(getattr(space, "shape", None) or ())
+    return SeenGame(
+        reader.agent_ids,
+        facts.team,
+        tuple(fleet.platforms),
+        tuple(map(float, facts.radius_m)),
+        facts.moves * facts.dt_s,
+        int(shape[0]) if len(shape) == 1 else 0,
+        reader.commands,
+    )
 
 
 class ActionReader:
@@ -32,7 +102,6 @@ class ActionReader:
     def __init__(self, env: Any) -> None:
         self._game = env if isinstance(env, SeenGame) else seen_game(env)
         self._top_mps = self._game.top_speed_mps
-        self._numbers = {agent_id: i for i, agent_id in enumerate(self._game.agent_ids)}
 
     def command(self, agent_id: str, action: Any) -> tuple[float, float]:
         """Speed m/s and relative heading deg an action asks for, from where the boat is now.
@@ -50,29 +119,28 @@ class ActionReader:
         row = self._decode(agent_id, action)
         return float(row[0]), float(row[1])
 
-    def problem(self, agent_id: str, action: Any) -> tuple[str, str] | None:
-        """What is wrong with an action, as (kind, explanation); None when it can be used."""
+    def problem(self, agent_id: str, action: Any) -> Fault | None:
+        """What is wrong with an action; None when it can be used."""
         if action is None:
             return "no answer", "compute_action returned None; return an action"
-        numeric = _as_numbers(action)
-        if numeric is not None and not np.isfinite(numeric).all():
-            return "not finite", f"{short(action)} is not finite"
+        try:
+            if not isinstance(action, (str, bytes)) and not np.isfinite(numbers(action)).all():
+                return "not finite", f"{short(action)} is not finite"
+        except NoNumbersError:  # none or too large ones: the game's decoder refuses those
+            pass
         try:
             row = self._decode(agent_id, action)
         except GameError as error:
             return "no action", str(error)[:300]
-        return self._too_large(agent_id, row)
-
-    def _decode(self, agent_id: str, action: Any) -> np.ndarray:
-        return self._game.commands({agent_id: action})[self._numbers[agent_id]]
-
-    def _too_large(self, agent_id: str, row: np.ndarray) -> tuple[str, str] | None:
         limit_mps = MAX_SPEED_FACTOR * self._top_mps[agent_id]
         if abs(row[0]) > limit_mps:
             return "too large", f"speed {row[0]:g} m/s is beyond {limit_mps:g} m/s"
         if abs(row[1]) > MAX_HEADING_DEG:
             return "too large", f"relative heading {row[1]:g} deg is beyond {MAX_HEADING_DEG:g} deg"
         return None
+
+    def _decode(self, agent_id: str, action: Any) -> np.ndarray:
+        return self._game.commands({agent_id: action})[self._game.agent_ids.index(agent_id)]
 
 
 def to_command(env: Any, agent_id: str, action: Any) -> tuple[float, float]:
@@ -85,13 +153,3 @@ def to_command(env: Any, agent_id: str, action: Any) -> tuple[float, float]:
     if agent_id not in game.agent_ids:
         raise PolicyError(f"unknown agent {agent_id!r}; agents are {', '.join(game.agent_ids)}")
     return ActionReader(game).command(agent_id, action)
-
-
-def _as_numbers(action: Any) -> np.ndarray | None:
-    """The action as floats, or None when it holds no numbers or too large ones (the game's decoder refuses those)."""
-    if isinstance(action, (str, bytes)):
-        return None
-    try:
-        return numbers(action)
-    except NoNumbersError:
-        return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -9,10 +10,35 @@ import numpy as np
 from steerclear.shield.exceptions import PolicyError
 
 from .guard import Answer, ForeignCode, GuardedTeam
-from .signatures import call_fault
 
 AgentFactory = Callable[[str, Any], Any]
 """``factory(agent_id, env) -> agent`` with ``compute_action(obs, info)``."""
+Function = Callable[[np.ndarray], Any]
+
+
+def call_fault(function: Callable[..., Any], arguments: Sequence[str]) -> str | None:
+    """Why a function cannot be called with so many arguments and answer at once; None when it can.
+
+    It is looked at before the game instead of in every step of it.
+
+    Args:
+        function: as it is called, bound.
+        arguments: their names, for the text.
+    """
+    if inspect.iscoroutinefunction(function) or inspect.isgeneratorfunction(function):
+        return "is a coroutine or generator, which answers nothing when it is called; return the action"
+    if inspect.isasyncgenfunction(function):
+        return "is an asynchronous generator; return the action"
+    try:
+        signature = inspect.signature(function)
+    except Exception:  # built-in functions tell nothing; foreign ones may raise anything
+        return None
+    try:
+        signature.bind(*arguments)
+    except TypeError:
+        named = [f"{one.name}=" if one.kind == one.KEYWORD_ONLY else one.name for one in signature.parameters.values()]
+        return f"takes ({', '.join(named)}), and is called with ({', '.join(arguments)})"
+    return None
 
 
 class AgentsCode(ForeignCode):
@@ -31,9 +57,7 @@ class AgentsCode(ForeignCode):
     def begin(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:
         """Take (or make) the agents of this game."""
         if isinstance(self._source, Mapping):
-            missing = [agent_id for agent_id in agent_ids if agent_id not in self._source]
-            if missing:
-                raise PolicyError(f"no agent for {', '.join(missing)}; agents are {', '.join(self._source) or 'none'}")
+            _check_all(self._source, agent_ids, "no agent for", "agents are")
             self._agents = {agent_id: self._source[agent_id] for agent_id in agent_ids}
         else:
             self._agents = {agent_id: self._source(agent_id, env) for agent_id in agent_ids}
@@ -50,13 +74,9 @@ class AgentsCode(ForeignCode):
 
 
 class CallableCode(ForeignCode):
-    """Functions of one boat's normalised observation.
+    """Functions of one boat's normalised observation, one for all boats or by agent id."""
 
-    Args:
-        functions: one for all boats, or by agent id.
-    """
-
-    def __init__(self, functions: Callable[[np.ndarray], Any] | Mapping[str, Callable[[np.ndarray], Any]]) -> None:
+    def __init__(self, functions: Function | Mapping[str, Function]) -> None:
         parts = list(functions.values()) if isinstance(functions, Mapping) else [functions]
         if not parts or not all(callable(part) for part in parts):
             raise PolicyError("give a function f(obs) -> action, or a dict agent_id -> such functions")
@@ -69,9 +89,7 @@ class CallableCode(ForeignCode):
     def begin(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:
         """Check that every boat has a function."""
         if isinstance(self._functions, Mapping):
-            missing = [agent_id for agent_id in agent_ids if agent_id not in self._functions]
-            if missing:
-                raise PolicyError(f"no function for {', '.join(missing)}; there are {', '.join(self._functions)}")
+            _check_all(self._functions, agent_ids, "no function for", "there are")
 
     def prepare(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> Answer:
         """Ask each boat's function."""
@@ -79,6 +97,12 @@ class CallableCode(ForeignCode):
         if isinstance(functions, Mapping):
             return lambda agent_id: functions[agent_id](observations[agent_id])
         return lambda agent_id: functions(observations[agent_id])
+
+
+def _check_all(given: Mapping[str, Any], agent_ids: Sequence[str], lacks: str, are: str) -> None:
+    missing = [agent_id for agent_id in agent_ids if agent_id not in given]
+    if missing:
+        raise PolicyError(f"{lacks} {', '.join(missing)}; {are} {', '.join(given) or 'none'}")
 
 
 def from_agents(agents: Mapping[str, Any] | AgentFactory, name: str = "agents") -> GuardedTeam:
@@ -95,9 +119,7 @@ def from_agents(agents: Mapping[str, Any] | AgentFactory, name: str = "agents") 
     return GuardedTeam(name, AgentsCode(agents))
 
 
-def from_callable(
-    function: Callable[[np.ndarray], Any] | Mapping[str, Callable[[np.ndarray], Any]], name: str = "callable"
-) -> GuardedTeam:
+def from_callable(function: Function | Mapping[str, Function], name: str = "callable") -> GuardedTeam:
     """A team that asks ``function(observation)`` for each boat.
 
     Args:

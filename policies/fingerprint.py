@@ -9,7 +9,7 @@ from pathlib import Path
 
 from steerclear.shield.exceptions import PolicyError
 
-from .entrants.listing import entrants
+from .entrants import entrants
 from .own import file_of, own_code
 from .registry import SB3_PREFIX, WEIGHTS_PREFIX, names
 

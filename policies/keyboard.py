@@ -40,11 +40,7 @@ class KeyboardTeam:
         self._boat = ""
 
     def reset(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:
-        """Begin a game.
-
-        Raises:
-            PolicyError: no such boat, or the env has no window and no keys were given.
-        """
+        """Begin a game."""
         core = game_core(env)
         by_number = dict(enumerate(agent_ids))
         self._boat = by_number.get(self._agent, "") if isinstance(self._agent, int) else self._agent
@@ -77,11 +73,7 @@ def steer(keys: set[str]) -> tuple[float, float]:
 
 
 def window_keys(env: Any) -> Keys:
-    """The keyboard of an env's window.
-
-    Raises:
-        PolicyError: the env shows no window.
-    """
+    """The keyboard of an env's window."""
     game = getattr(env, "unwrapped", env)
     if getattr(game, "render_mode", None) != "human":
         raise PolicyError("the keyboard policy needs a window: build the env with render_mode='human'")

@@ -40,11 +40,7 @@ def file_of(where: str) -> Path | None:
 
 
 def check_own(where: str, name: str) -> None:
-    """Look whether there is such a file or module, without running it.
-
-    Raises:
-        PolicyError: there is none.
-    """
+    """Look whether there is such a file or module, without running it."""
     path = file_of(where)
     try:
         there = path.is_file() if path is not None else importlib.util.find_spec(where) is not None
@@ -55,11 +51,7 @@ def check_own(where: str, name: str) -> None:
 
 
 def load_own(where: str, name: str) -> TeamPolicy:
-    """The team policy of that name in a file or module.
-
-    Raises:
-        PolicyError: there is none, or it cannot be built.
-    """
+    """The team policy of that name in a file or module."""
     try:
         found = getattr(_module(where), name, None)
         if found is None:

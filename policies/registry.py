@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import difflib
 import inspect
+import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from steerclear.shield.exceptions import PolicyError
 
-from .entrants.listing import entrants
+from .entrants import entrants
 from .keyboard import KeyboardTeam, Keys
 from .own import check_own, load_own, own_code
 from .protocol import BatchPolicy, TeamPolicy
@@ -19,15 +20,13 @@ from .scripted.batch import ScriptedBatch
 from .scripted.layout import Behaviour
 from .scripted.plan import (
     MEDIUM_REACH_M,
+    ROLES,
     Plan,
-    by_name,
-    checked_fraction,
+    checked_number,
     checked_points,
-    checked_reach,
     composition_of,
-    everyone,
-    hidden,
-    in_roles,
+    roles_of,
+    words_of,
 )
 from .scripted.team import ScriptedTeam
 
@@ -42,69 +41,78 @@ class Entry:
     plan: Callable[..., Plan]
 
 
-def _single(behaviour: Behaviour) -> Callable[[], Plan]:
-    return lambda: Plan(everyone(behaviour))
+def _alike(behaviour: Behaviour) -> Callable[[], Plan]:
+    return lambda: Plan(boats=(behaviour,))
+
+
+def _in_roles(level: str, roles: Roles, reach_m: float = MEDIUM_REACH_M) -> Plan:
+    """A team of attackers and defenders of a level; a word for all boats, or one each."""
+    pair = Behaviour[f"{level}_ATTACK"], Behaviour[f"{level}_DEFEND"]
+    return Plan(pair, () if roles is None else words_of("roles", roles, ROLES), reach_m=_reach(reach_m))
+
+
+def _reach(reach_m: float) -> float:
+    return checked_number("reach_m", reach_m, math.inf, "a distance in m above 0")
+
+
+def _fraction(speed_fraction: float) -> float:
+    return checked_number("speed_fraction", speed_fraction, 1.0, "a number above 0 and at most 1")
 
 
 def _easy(roles: Roles = None) -> Plan:
-    return Plan(in_roles(Behaviour.EASY_ATTACK, Behaviour.EASY_DEFEND, roles))
+    return _in_roles("EASY", roles)
 
 
 def _medium(roles: Roles = None, reach_m: float = MEDIUM_REACH_M) -> Plan:
-    return Plan(in_roles(Behaviour.MEDIUM_ATTACK, Behaviour.MEDIUM_DEFEND, roles), reach_m=checked_reach(reach_m))
+    return _in_roles("MEDIUM", roles, reach_m)
 
 
 def _medium_attack(reach_m: float = MEDIUM_REACH_M) -> Plan:
-    return Plan(everyone(Behaviour.MEDIUM_ATTACK), reach_m=checked_reach(reach_m))
+    return Plan(boats=(Behaviour.MEDIUM_ATTACK,), reach_m=_reach(reach_m))
 
 
 def _hard(roles: Roles = None) -> Plan:
-    if roles is None:
-        return Plan(everyone(Behaviour.HARD))
-    return Plan(in_roles(Behaviour.HARD_ATTACK, Behaviour.HARD_DEFEND, roles))
+    return Plan(boats=(Behaviour.HARD,)) if roles is None else _in_roles("HARD", roles)
 
 
 def _hidden(composition: str | int | None = None) -> Plan:
-    return Plan(hidden(composition))
+    return replace(_in_roles("MEDIUM", None), roles=None if composition is None else roles_of(composition))
 
 
 def _rammer(target_team_mates: bool = False, speed_fraction: float = 1.0) -> Plan:
     if not isinstance(target_team_mates, bool):
         raise PolicyError(f"target_team_mates is {target_team_mates!r}; give True or False")
-    return Plan(
-        everyone(Behaviour.RAMMER),
-        speed_fraction=checked_fraction(speed_fraction),
-        target_team_mates=target_team_mates,
-    )
+    fraction = _fraction(speed_fraction)
+    return Plan(boats=(Behaviour.RAMMER,), speed_fraction=fraction, target_team_mates=target_team_mates)
 
 
 def _waypoints(points: Any = None, speed_fraction: float = 1.0) -> Plan:
-    return Plan(
-        everyone(Behaviour.WAYPOINTS), points=checked_points(points), speed_fraction=checked_fraction(speed_fraction)
-    )
+    fraction = _fraction(speed_fraction)
+    return Plan(boats=(Behaviour.WAYPOINTS,), points=checked_points(points), speed_fraction=fraction)
 
 
 def _mixed(boats: str | Sequence[str] = "medium_attack") -> Plan:
-    return Plan(by_name(boats))
+    words = words_of("boats", boats, [behaviour.name.lower() for behaviour in Behaviour])
+    return Plan(boats=tuple(Behaviour[word.upper()] for word in words))
 
 
 ENTRIES: dict[str, Entry] = {
     "easy": Entry("organisers' easy team: fixed paths, two attack, one defends (roles=...)", _easy),
-    "easy_attack": Entry("every boat loops own base, their flag, own base", _single(Behaviour.EASY_ATTACK)),
-    "easy_defend": Entry("every boat patrols in front of its base", _single(Behaviour.EASY_DEFEND)),
+    "easy_attack": Entry("every boat loops own base, their flag, own base", _alike(Behaviour.EASY_ATTACK)),
+    "easy_defend": Entry("every boat patrols in front of its base", _alike(Behaviour.EASY_DEFEND)),
     "medium": Entry(
         "organisers' medium team: potential fields, two attack, one defends (roles=..., reach_m=...)", _medium
     ),
     "medium_attack": Entry("every boat goes for the flag, pushed off opponents (reach_m=...)", _medium_attack),
-    "medium_defend": Entry("every boat chases intruders in its half", _single(Behaviour.MEDIUM_DEFEND)),
+    "medium_defend": Entry("every boat chases intruders in its half", _alike(Behaviour.MEDIUM_DEFEND)),
     "hidden": Entry(
         "organisers' hidden team: medium; defends, attacks or is mixed, by seed (composition=...)", _hidden
     ),
     "hard": Entry("every boat attacks, and defends while its flag is threatened (roles=... fixes who does)", _hard),
-    "hard_attack": Entry("bolder medium_attack; all return when one has the flag", _single(Behaviour.HARD_ATTACK)),
-    "hard_defend": Entry("every boat stays between its flag and the nearest opponent", _single(Behaviour.HARD_DEFEND)),
-    "hold": Entry("every boat stops", _single(Behaviour.HOLD)),
-    "random": Entry("seeded random walk: discrete actions held for 1 to 5 s", _single(Behaviour.RANDOM)),
+    "hard_attack": Entry("bolder medium_attack; all return when one has the flag", _alike(Behaviour.HARD_ATTACK)),
+    "hard_defend": Entry("every boat stays between its flag and the nearest opponent", _alike(Behaviour.HARD_DEFEND)),
+    "hold": Entry("every boat stops", _alike(Behaviour.HOLD)),
+    "random": Entry("seeded random walk: discrete actions held for 1 to 5 s", _alike(Behaviour.RANDOM)),
     "rammer": Entry("lead pursuit of the nearest opponent (target_team_mates=..., speed_fraction=...)", _rammer),
     "waypoints": Entry("seeded random waypoints, or given ones (points=..., speed_fraction=...)", _waypoints),
     "mixed": Entry("any mix of the scripted boats (boats='medium_attack,rammer,hold')", _mixed),
@@ -227,9 +235,9 @@ def _batch_builder(name: str) -> tuple[Callable[..., Any], tuple[Any, ...]] | No
     """What builds the batch policy of an entrant or a file, and its first arguments; None: single games only."""
     from .entrants.learned import batch_builder
 
-    learned, entrant = batch_builder(name), entrants().get(name)
-    if learned is not None:
-        return learned.build, learned.first
+    entrant = entrants().get(name)
+    if (learned := batch_builder(name)) is not None:
+        return learned
     return None if entrant is None or entrant.batch is None else (entrant.batch, ())
 
 

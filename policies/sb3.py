@@ -30,16 +30,7 @@ MAX_BYTES, MAX_DATA_BYTES = 1024**3, 64 * 1024**2
 """Largest size of a model, unpacked, and of the settings in it, bytes."""
 ENTRIES = frozenset({"entries", "entry", "submissions", "submission", "tournament", "tournaments"})
 """Names of folders that hold what others handed in."""
-UNREADABLE = (
-    zipfile.BadZipFile,
-    KeyError,
-    ValueError,
-    RecursionError,
-    RuntimeError,
-    EOFError,
-    OSError,
-    zlib.error,
-)
+UNREADABLE = (zipfile.BadZipFile, KeyError, ValueError, RecursionError, RuntimeError, EOFError, OSError, zlib.error)
 """What reading a damaged or hostile zip raises."""
 logger = logging.getLogger(__name__)
 _SAID: set[Path] = set()
@@ -51,14 +42,7 @@ class Sb3Code(ForeignCode):
     A Discrete model sends action numbers; a Box model sends (speed m/s, relative heading deg), or, when its space is
     [-1, 1], the same scaled to 0..top speed and -180..180 deg.
 
-    Args:
-        path: the saved model.
-        algorithm: one of ``ALGORITHMS``; None tells it from the file.
-        allow_code: see `load_sb3`.
-        max_bytes: largest unpacked size.
-
-    Raises:
-        PolicyError: the extra ``[train]`` is missing, the file is no model this can play, or not to be loaded.
+    Arguments and errors are those of `load_sb3`.
     """
 
     def __init__(
@@ -80,12 +64,15 @@ class Sb3Code(ForeignCode):
             library = importlib.import_module("stable_baselines3")
         except ImportError as error:
             raise PolicyError(f"sb3 models need the extra: {install_command('train')}") from error
-        say_it_runs_code(self._path)
+        if self._path.resolve() not in _SAID:  # once in this process
+            _SAID.add(self._path.resolve())
+            logger.warning("%s", code_warning(self._path))
         try:
             self._model = getattr(library, name).load(self._path, device="cpu")
         except Exception as error:  # whatever the unpickler meets, it is this file that cannot be used
             raise PolicyError(f"{self._path} cannot be loaded as {name}: {error}; name its algorithm") from error
-        self._scaled = _is_unit_box(self._model.action_space)
+        low, high = (getattr(self._model.action_space, name, None) for name in ("low", "high"))
+        self._scaled = low is not None and high is not None and bool(np.all(low == -1.0) and np.all(high == 1.0))
 
     def begin(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:
         """Check that the model was made for these observations."""
@@ -110,15 +97,6 @@ class Sb3Code(ForeignCode):
         return action
 
 
-def saved_algorithm(path: Path) -> str:
-    """Which algorithm wrote a model, told from the settings it saved.
-
-    Raises:
-        PolicyError: the file is not a saved model, or too large.
-    """
-    return algorithm_of(saved_settings(path))
-
-
 def algorithm_of(saved: Mapping[str, Any]) -> str:
     """Which algorithm saved such settings."""
     for mark, algorithm in _MARKS:
@@ -137,9 +115,14 @@ def saved_settings(path: Path, max_bytes: int = MAX_BYTES) -> Mapping[str, Any]:
         with zipfile.ZipFile(path) as archive:
             members = archive.infolist()
             check_members(path, members, max_bytes)
-            weights = [member for member in members if member.filename.endswith(".pth")]
-            for member in weights:
-                _check_weights(path, archive.open(member).read(member.file_size), max_bytes)
+            for member in members:
+                if member.filename.endswith(".pth"):
+                    content = io.BytesIO(archive.open(member).read(member.file_size))
+                    inner = zipfile.ZipFile(content).infolist() if zipfile.is_zipfile(content) else []
+                    if (total := sum(one.file_size for one in inner)) > max_bytes:
+                        raise PolicyError(
+                            f"{path}: its weights unpack to {total} bytes, more than {max_bytes}; raise max_bytes"
+                        )
             data = archive.getinfo("data")
             if data.file_size > MAX_DATA_BYTES:
                 raise PolicyError(f"{path}: its settings have {data.file_size} bytes, more than {MAX_DATA_BYTES}")
@@ -149,16 +132,6 @@ def saved_settings(path: Path, max_bytes: int = MAX_BYTES) -> Mapping[str, Any]:
     if not isinstance(saved, Mapping):
         raise PolicyError(f"{path} is not a Stable-Baselines3 model: no settings in it; give the zip model.save wrote")
     return saved
-
-
-def _check_weights(path: Path, content: bytes, max_bytes: int) -> None:
-    """Refuse a file of weights, itself a zip, that unpacks to too much."""
-    if not zipfile.is_zipfile(io.BytesIO(content)):
-        return
-    with zipfile.ZipFile(io.BytesIO(content)) as inner:
-        total = sum(member.file_size for member in inner.infolist())
-    if total > max_bytes:
-        raise PolicyError(f"{path}: its weights unpack to {total} bytes, more than {max_bytes}; raise max_bytes")
 
 
 def check_origin(path: Path, allow_code: bool | None) -> None:
@@ -190,21 +163,9 @@ def entries_around(path: Path) -> Path | None:
     return None
 
 
-def say_it_runs_code(path: Path) -> None:
-    """Say once in this process, before it is loaded, what loading a model means."""
-    if path.resolve() not in _SAID:
-        _SAID.add(path.resolve())
-        logger.warning("%s", code_warning(path))
-
-
 def code_warning(path: str | Path) -> str:
     """What loading a model means."""
     return f"loading the model {path} runs code of whoever made it"
-
-
-def _is_unit_box(space: Any) -> bool:
-    low, high = getattr(space, "low", None), getattr(space, "high", None)
-    return low is not None and high is not None and bool(np.all(low == -1.0) and np.all(high == 1.0))
 
 
 def trained_here(path: str | Path) -> bool:
@@ -222,23 +183,18 @@ def read_card(file: Path) -> dict[str, Any]:
         PolicyError: the zip or its card cannot be read.
     """
     try:
-        return _card(file)
+        with zipfile.ZipFile(file) as archive:
+            if CARD not in archive.namelist():
+                return {}
+            if archive.getinfo(CARD).file_size > MOST_CARD_BYTES:
+                raise ValueError("its card is too large")
+            card: Any = json.loads(archive.read(CARD))
+            if not isinstance(card, dict):
+                raise ValueError("its card is none")
+            return card
     except UNREADABLE as error:
         why = " ".join(str(error).split())[:160]
         raise PolicyError(f"{file} is not a Stable-Baselines3 model: {why}; give the zip model.save wrote") from error
-
-
-def _card(file: Path) -> dict[str, Any]:
-    """The card, or what is wrong with it as one of `UNREADABLE`."""
-    with zipfile.ZipFile(file) as archive:
-        if CARD not in archive.namelist():
-            return {}
-        if archive.getinfo(CARD).file_size > MOST_CARD_BYTES:
-            raise ValueError("its card is too large")
-        card = json.loads(archive.read(CARD))
-    if not isinstance(card, dict):
-        raise ValueError("its card is none")
-    return card
 
 
 def load_sb3(

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from steerclear.env.config import GameConfig
-from steerclear.policies.report import PolicyReport
+from steerclear.policies.guard import PolicyReport
 from steerclear.policies.submissions.made_for import made_for
 from steerclear.shield.exceptions import PolicyError
 
@@ -45,10 +45,6 @@ def check_entry(path: str, preset: str, max_time_s: float | None, answer_s: floa
 
     Returns:
         What `docs_keys.ENTRY_CHECK` describes.
-
-    Raises:
-        PolicyError: it cannot be loaded, or gave nothing usable throughout the game; the message says why.
-        ConfigError: a setting is unusable.
     """
     imports, made = imports_of(path), made_for(path)
     started = time.perf_counter()

@@ -1,10 +1,11 @@
-"""What runs in an entry's process: loads its policy, begins a game and answers its steps. See `process` for the orders.
+"""What runs in an entry's process: loads its policy, begins a game and answers its steps. See `team` for the orders.
 
-Orders are pickled tuples of ours; answers are JSON.
+Orders are pickled tuples of ours; answers are JSON, so that nothing is unpickled that foreign code may have made.
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import pickle
@@ -14,13 +15,19 @@ from collections.abc import Mapping, Sequence
 from multiprocessing.connection import Connection
 from typing import Any, cast
 
+import numpy as np
 from steerclear import policies
 from steerclear.policies.guard import ForeignCode, GameFacts, GuardedTeam
 from steerclear.shield.exceptions import SteerclearError
-from steerclear.shield.foreign import describe_error
+from steerclear.shield.foreign import describe_error, plain_text
 
-from .answers import to_plain
 from .sandbox import AGAIN
+
+MOST = 64
+"""Numbers of an action, and characters of a text, that are looked at: no action has as many."""
+DEEPEST = 4
+"""Lists within lists that are looked at."""
+_NUMBERS = ("bool", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64", "float32", "float64")
 
 
 def serve(read_fd: int, write_fd: int, folder: str) -> int:
@@ -38,7 +45,8 @@ def serve(read_fd: int, write_fd: int, folder: str) -> int:
         answer = player.obey(order, arguments)
         if os.getpid() != own:
             os._exit(0)  # the entry forked: its child has no part in the game
-        _flush()
+        with contextlib.suppress(Exception):  # the entry's own, by now
+            sys.stdout.flush()
         answers.send_bytes(json.dumps(answer).encode())
 
 
@@ -57,7 +65,8 @@ class Player:
         except SteerclearError as error:
             return {"failed": str(error)}
         except BaseException as error:  # foreign code may raise anything
-            return {"failed": f"policy {self._name()!r} cannot {order}: {describe_error(error)}"}
+            name = "" if self._team is None else self._team.name
+            return {"failed": f"policy {name!r} cannot {order}: {describe_error(error)}"}
 
     def _load(self, path: str, options: Mapping[str, Any]) -> dict[str, Any]:
         self._team = team = cast(GuardedTeam, policies.make(path, **options))  # as it makes of paths
@@ -79,9 +88,6 @@ class Player:
             raise SteerclearError("no policy was loaded")
         return self._team.code
 
-    def _name(self) -> str:
-        return "" if self._team is None else self._team.name
-
 
 def _ask(code: ForeignCode, answer: Any, agent_id: str) -> dict[str, Any]:
     """One boat's action, or what was raised instead, and how long that took."""
@@ -95,8 +101,47 @@ def _ask(code: ForeignCode, answer: Any, agent_id: str) -> dict[str, Any]:
         return {"raised": type(error).__name__, "text": describe_error(error), "ns": spent_ns}
 
 
-def _flush() -> None:
+class Unreadable:
+    """Stands for an answer that is no action, and looks like it."""
+
+    def __init__(self, text: str) -> None:
+        self._text = text
+
+    def __repr__(self) -> str:
+        return self._text
+
+
+def to_plain(action: Any, depth: int = 0) -> Any:
+    """An answer as JSON content, from which `from_plain` makes the same action."""
+    if hasattr(action, "detach"):  # a tensor
+        action = action.detach().cpu().numpy()
+    if isinstance(action, (np.ndarray, np.generic)) and action.size <= MOST and action.dtype.name in _NUMBERS:
+        return {"array": action.tolist(), "dtype": action.dtype.name, "scalar": isinstance(action, np.generic)}
+    if isinstance(action, list | tuple) and len(action) <= MOST and depth < DEEPEST:
+        return {"tuple" if isinstance(action, tuple) else "list": [to_plain(item, depth + 1) for item in action]}
+    short = (type(action) is int and abs(action) < 2**63) or (type(action) is str and len(action) <= MOST)
+    if short or action is None or type(action) in (bool, float):
+        return action
     try:
-        sys.stdout.flush()
-    except Exception:  # the entry's own, by now
-        return
+        text = repr(action)
+    except Exception:
+        text = type(action).__name__
+    return {"unreadable": plain_text(text, 80)}
+
+
+def from_plain(content: Any, depth: int = 0) -> Any:
+    """The action that `to_plain` took; whatever else it is given, some action or something unreadable."""
+    if not isinstance(content, Mapping):
+        return Unreadable("a list") if isinstance(content, list) else content
+    array, dtype = content.get("array"), content.get("dtype")
+    if dtype in _NUMBERS and array is not None:
+        try:
+            made = np.array(array, dtype=dtype)
+        except (TypeError, ValueError, OverflowError):
+            return Unreadable("an array")
+        return made[()] if content.get("scalar") is True and made.ndim == 0 else made
+    for name, kind in (("tuple", tuple), ("list", list)):
+        items = content.get(name)
+        if isinstance(items, list) and depth < DEEPEST:
+            return kind(from_plain(item, depth + 1) for item in items)
+    return Unreadable(plain_text(content.get("unreadable", "nothing"), 80))

@@ -27,25 +27,17 @@ class Imports:
 
 
 def imports_of(path: str | Path) -> Imports:
-    """Read what the files of a submission import.
-
-    Raises:
-        PolicyError: there is no submission there.
-    """
+    """Read what the files of a submission import."""
     stage = Stage(path)
     try:
         files = sorted(file for file in stage.folder.rglob("*.py") if "working_dir" not in file.parts)
         own = {file.stem for file in files} | {part for file in files for part in file.relative_to(stage.folder).parts}
-        found: set[str] = set()
-        unread = []
-        for file in files:
-            names = _imported(file)
-            if names is None:
-                unread.append(str(file.relative_to(stage.folder)))
-            found |= names or set()
+        found = {str(file.relative_to(stage.folder)): _imported(file) for file in files}
     finally:
         stage.close()
-    needed = sorted(found - own - set(sys.stdlib_module_names))
+    names = {name for some in found.values() for name in some or ()}
+    needed = sorted(names - own - set(sys.stdlib_module_names))
+    unread = [file for file, some in found.items() if some is None]
     return Imports(tuple(needed), tuple(name for name in needed if not _is_here(name)), tuple(unread))
 
 

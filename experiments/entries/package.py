@@ -61,11 +61,7 @@ def renamed(text: str, package: str) -> str:
 
 
 def data(platforms: Iterable[str | Platform]) -> dict[str, bytes]:
-    """Boats and value tables by path inside the package.
-
-    Raises:
-        ConfigError: a boat has no value table that can be read where the shield looks for one.
-    """
+    """Boats and value tables by path inside the package."""
     kinds = sorted({get_platform(name) for name in platforms}, key=lambda kind: kind.name)
     files = {"shield/platforms/platforms.json": json.dumps([asdict(kind) for kind in kinds]).encode()}
     for own in kinds:
@@ -87,9 +83,6 @@ def game_spec(preset: str, shield: dict[str, Any]) -> dict[str, Any]:
     Args:
         preset: rules of the game.
         shield: settings of the shield that are not the default; its step is the game's.
-
-    Raises:
-        ConfigError: an unknown preset, one whose global state is not told in metres, or a bad setting.
     """
     config = GameConfig.preset(preset)
     if not config.shows_disabled:

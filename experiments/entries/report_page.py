@@ -68,10 +68,6 @@ def shielded_zip(
 
     Returns:
         Its path, empty where there is none, and why there is none, in sentences.
-
-    Raises:
-        PolicyError: there is no entry.
-        ConfigError: it cannot be written.
     """
     made, stage = made_for(entry), Stage(entry)
     try:
@@ -126,9 +122,6 @@ def write_entry_page(
 
     Returns:
         The path written.
-
-    Raises:
-        ConfigError: the file cannot be written.
     """
     groups = by_opponent(rows, settings)
     page = render(

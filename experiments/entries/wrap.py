@@ -1,8 +1,9 @@
-"""A shielded zip out of an entry."""
+"""Zips to hand in: an entry behind the shield, and a learned network as an entry."""
 
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import os
 import sys
@@ -12,16 +13,20 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+import numpy as np
+from steerclear.env.config import PRESETS, GameConfig
+from steerclear.policies.entrants.learned.network import Network, arrays_of
 from steerclear.policies.submissions.made_for import ABOUT_FILE, MadeFor
 from steerclear.policies.submissions.stage import ENTRY_FILE, WORKING_DIR, Stage
 from steerclear.shield.exceptions import ConfigError
 
-from ..result_files import check_new, check_place, make_folder_of, told_settings
+from ..result_files import make_folder_of, told_settings
 from .check import check_entry
 from .package import code, data, game_spec, renamed
 from .team import EntryTeam
 
 TEMPLATE = Path(__file__).parent / "shielded_solution.txt"
+LEARNED = Path(__file__).parent.parent / "templates" / "learned_solution.py.txt"
 PREFIX = "steerclear_"
 """Of private packages' names; the rest tells one content from another, so that two zips can meet in one process."""
 MARKS = ("team_shield.py", "crew.py")
@@ -44,16 +49,14 @@ def wrap_entry(entry: str, out: Path, preset: str, shield: dict[str, Any]) -> di
 
     Returns:
         What `docs_keys.ENTRY_WRAP` describes, and as ``tried`` what `check.check_entry` found of the entry.
-
-    Raises:
-        PolicyError: there is no entry, it cannot be loaded, or it gave nothing usable: a shield would hide that.
-        ConfigError: the output exists or is no zip, the entry is shielded already, or a setting is unusable.
     """
-    check_out(out)
+    if out.suffix != ".zip":
+        raise ConfigError(f"--out is {out}; give the name of a zip, such as shielded.zip")
     spec = game_spec(preset, shield)
     stage = Stage(entry)
     try:
-        check_bare(stage.folder, entry)
+        if any(path for mark in MARKS for path in stage.folder.glob(f"{PREFIX}*/{mark}")):
+            raise ConfigError(f"{entry} is shielded already; wrap the entry that it was made of")
         tried = check_entry(entry, preset, TRIED_S, ANSWER_S)
         package, files = shielded_files(spec, preset, own_files(stage.folder))
         write_zip(out, files)
@@ -75,28 +78,6 @@ def wrap_entry(entry: str, out: Path, preset: str, shield: dict[str, Any]) -> di
     }
 
 
-def check_out(out: Path) -> None:
-    """Check that a zip can be written there.
-
-    Raises:
-        ConfigError: it cannot.
-    """
-    if out.suffix != ".zip":
-        raise ConfigError(f"--out is {out}; give the name of a zip, such as shielded.zip")
-    check_new(out, "--out")
-    check_place(out, "--out")
-
-
-def check_bare(folder: Path, entry: str) -> None:
-    """Check that an entry has no shield yet.
-
-    Raises:
-        ConfigError: it has.
-    """
-    if any(path for mark in MARKS for path in folder.glob(f"{PREFIX}*/{mark}")):
-        raise ConfigError(f"{entry} is shielded already; wrap the entry that it was made of")
-
-
 def shielded_files(spec: dict[str, Any], preset: str, own: Mapping[str, Path]) -> tuple[str, dict[str, bytes | Path]]:
     """Name of the private package, which hangs on all that is in the zip, and the zip's files by name.
 
@@ -105,7 +86,12 @@ def shielded_files(spec: dict[str, Any], preset: str, own: Mapping[str, Path]) -
         preset: rules of the game that they are of.
         own: the entry's files by name.
     """
-    made = about(spec, preset)
+    shield = spec["shield"]
+    made = MadeFor(preset, spec["decision_s"], tuple(spec["platforms"]), shield["separation_m"], told_settings(shield))
+    words = (
+        f"For preset {preset}, a decision every {made.decision_s:g} s. The shield keeps {made.separation_m:g} m, "
+        f"profile {shield['profile']}; all its settings are in {ABOUT_FILE}."
+    )
     plain: dict[str, bytes] = {name: text.encode() for name, text in code().items()}
     plain |= data(spec["platforms"])
     plain["facts.json"] = json.dumps(spec).encode()
@@ -121,22 +107,8 @@ def shielded_files(spec: dict[str, Any], preset: str, own: Mapping[str, Path]) -
     files |= {f"{entry}.py" if name == ENTRY_FILE else name: path for name, path in own.items()}
     text = TEMPLATE.read_text(encoding="utf-8").replace("OWN_MODULES", repr(own_modules(own)))
     text = text.replace("ENTRY_FILE", f"{entry}.py").replace("ENTRY_NAME", entry).replace("PACKAGE", package)
-    text = text.replace("ABOUT", textwrap.fill(words_of(made), 100))
+    text = text.replace("ABOUT", textwrap.fill(words, 100))
     return package, {**files, ENTRY_FILE: text.encode(), ABOUT_FILE: made.to_bytes()}
-
-
-def about(spec: dict[str, Any], preset: str) -> MadeFor:
-    """What a shielded zip says of itself."""
-    shield = spec["shield"]
-    return MadeFor(preset, spec["decision_s"], tuple(spec["platforms"]), shield["separation_m"], told_settings(shield))
-
-
-def words_of(made: MadeFor) -> str:
-    """The same for people: which game, which shield."""
-    return (
-        f"For preset {made.preset}, a decision every {made.decision_s:g} s. The shield keeps {made.separation_m:g} m, "
-        f"profile {made.shield['profile']}; all its settings are in {ABOUT_FILE}."
-    )
 
 
 def own_files(folder: Path) -> dict[str, Path]:
@@ -157,11 +129,7 @@ def own_modules(own: Iterable[str]) -> list[str]:
 
 
 def write_zip(out: Path, files: dict[str, Any]) -> None:
-    """Write a zip of files, given by path or content; never leaves half of one under its name.
-
-    Raises:
-        ConfigError: it cannot be written.
-    """
+    """Write a zip of files, given by path or content; never leaves half of one under its name."""
     part = out.with_name(out.name + ".part")
     try:
         make_folder_of(out)
@@ -176,3 +144,20 @@ def write_zip(out: Path, files: dict[str, Any]) -> None:
         raise ConfigError(f"{out} cannot be written ({error}); give another place with --out") from error
     finally:
         part.unlink(missing_ok=True)
+
+
+def write_submission(network: Network, path: Path) -> Path:
+    """Write a network as a competition entry: a zip with ``solution.py`` and its weights, which needs numpy only."""
+    if network.kind == "raids":
+        raise ConfigError("raids look at the whole game, which no entry is told; play them here, as weights:FILE")
+    if network.kind != "discrete":
+        raise ConfigError("an entry for the competition sends action numbers; train with actions: discrete")
+    where = f"It learned in preset {network.preset}. " if network.preset else ""
+    about = f"{where}There is no shield in it: ``steerclear entry wrap`` puts one round it."
+    content = io.BytesIO()
+    np.savez_compressed(content, **arrays_of(network))
+    files = {ENTRY_FILE: LEARNED.read_text(encoding="utf-8").replace("ABOUT", about).encode()}
+    if network.preset in PRESETS:
+        files[ABOUT_FILE] = MadeFor(network.preset, GameConfig.preset(network.preset).decision_s).to_bytes()
+    write_zip(path, {**files, "weights.npz": content.getvalue()})
+    return path

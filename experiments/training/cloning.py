@@ -12,12 +12,11 @@ from typing import Any
 import numpy as np
 from steerclear.env.mctf import MctfEnv
 from steerclear.policies import make
-from steerclear.policies.entrants.learned.chooser import OPTION_NAMES, Chooser, write_chooser
-from steerclear.policies.entrants.learned.teacher import Teacher
+from steerclear.policies.entrants.learned.cloned import OPTION_NAMES, Chooser, Teacher, write_chooser
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.extras import install_command
 
-from .config import CloningConfig, CloningOptions
+from .config import CloningOptions, Config
 from .env import core_of
 from .training import BEST, FINAL, Notice, Training
 
@@ -27,22 +26,15 @@ HELD_OUT = 0.2
 class CloningTraining(Training):
     """Demonstrations of the scripted demonstrator (or of people, from Parquet), and a network that chooses as it does.
 
-    Args:
-        config: what it is to be; ``games`` are played where no demonstrations are given.
-        folder: where everything goes.
-        resume: is not looked at: it takes seconds.
+    Where no demonstrations are given, ``games`` are played. It takes seconds, so that nothing is resumed.
     """
 
-    def __init__(self, config: CloningConfig, folder: Path, resume: bool = False) -> None:
+    def __init__(self, config: Config, folder: Path, resume: bool = False) -> None:
         super().__init__(config, folder)
         self.total = config.games
 
     def run(self, notice: Notice = lambda done, words: None) -> None:
-        """Play or read, learn, write.
-
-        Raises:
-            ConfigError: demonstrations that are none.
-        """
+        """Play or read, learn, write."""
         source = self.config.options.demonstrations
         rows = _read(Path(source)) if source else self._played(notice)
         about = {"demonstrations": "people" if source else "scripted demonstrator", "rows": len(rows)}
@@ -63,7 +55,7 @@ class CloningTraining(Training):
         return rows
 
 
-def demonstrated(config: CloningConfig, opponent: str, seed: int) -> list[dict[str, Any]]:
+def demonstrated(config: Config, opponent: str, seed: int) -> list[dict[str, Any]]:
     """Rows of one game of the scripted demonstrator."""
     rules = core_of(config, 1, seed).config
     env = MctfEnv(rules, action_kind="continuous")
@@ -79,11 +71,7 @@ def demonstrated(config: CloningConfig, opponent: str, seed: int) -> list[dict[s
 
 
 def _read(path: Path) -> list[dict[str, Any]]:
-    """Rows of a file of ``steerclear demonstrate``.
-
-    Raises:
-        ConfigError: there is none, or pyarrow is missing.
-    """
+    """Rows of a file of ``steerclear demonstrate``."""
     try:
         import pyarrow.parquet as parquet
     except ModuleNotFoundError as error:
@@ -97,11 +85,7 @@ def _read(path: Path) -> list[dict[str, Any]]:
 def fitted(
     rows: list[dict[str, Any]], options: CloningOptions, seed: int, card: dict[str, Any]
 ) -> tuple[Chooser, list[dict[str, Any]]]:
-    """A chooser fitted to rows, and its curve: cross-entropy with Adam, a fifth of the rows held out.
-
-    Raises:
-        ConfigError: too few rows, or rows without what was seen.
-    """
+    """A chooser fitted to rows, and its curve: cross-entropy with Adam, a fifth of the rows held out."""
     try:
         names = Chooser.columns(rows[0])
         seen = np.array([[float(row[name]) for name in names] for row in rows])
@@ -127,12 +111,7 @@ def fitted(
 
 
 class _Adam:
-    """Kingma and Ba (2015), in place.
-
-    Args:
-        parameters: arrays to change.
-        rate: step.
-    """
+    """Kingma and Ba (2015), in place."""
 
     def __init__(self, parameters: list[np.ndarray], rate: float) -> None:
         self._parameters, self._rate, self._steps = parameters, rate, 0

@@ -19,27 +19,23 @@ from steerclear.shield.wrappers.game_facts import facts_of_games
 from steerclear.shield.wrappers.tallies import OWN_EVENTS
 from steerclear.shield.wrappers.team_batch import Stepped
 
-from .config import Games, Learning, Stage
+from .config import Config, Stage
 from .opponents import Pool
 from .rewards import WeightedSum
 
 
-def core_of(config: Games, games: int, seed: int, stage: Stage | None = None) -> BatchedMctf:
-    """So many games by a config's rules, a stage's or those of evaluations, starts drawn from the seed.
-
-    Raises:
-        ConfigError: the rules cannot be.
-    """
+def core_of(config: Config, games: int, seed: int, stage: Stage | None = None) -> BatchedMctf:
+    """So many games by a config's rules, a stage's or those of evaluations, starts drawn from the seed."""
     return BatchedMctf(config.game(stage), n_games=games, seed=seed)
 
 
-def shield_of(config: Learning, core: BatchedMctf, team: str = "blue", stage: Stage | None = None) -> Any:
+def shield_of(config: Config, core: BatchedMctf, team: str = "blue", stage: Stage | None = None) -> Any:
     """The shield of a config for some games, of a stage or of evaluations."""
     settings = ShieldConfig.of(**{**facts_of_games(core).settings(), **config.shield_of(stage)})
     return games_shield(core, settings, team=team)
 
 
-def pool_of(config: Learning, stage: Stage) -> Pool:
+def pool_of(config: Config, stage: Stage) -> Pool:
     """The opponents of a stage."""
     return Pool(stage, config.league, config.seed, config.entrants_every)
 
@@ -51,14 +47,10 @@ def set_tags(core: BatchedMctf, stage: Stage) -> None:
 
 
 class AskedShield:
-    """A command filter that asks another in the first game step of a decision and every so many after it.
+    """The command filter of a batch, asked in the first game step of a decision and every so many after it.
 
     Asked seldom it costs less and guarantees nothing in between, where what it said is held as a course and speed:
     then it is a teacher only. Evaluations ask in every game step.
-
-    Args:
-        batch: the games; from now on its filter is this one.
-        every: game steps between questions.
 
     Attributes:
         spent_s: time it was asked for, s.
@@ -105,7 +97,7 @@ class TrainEnv(MctfVecEnv):
         ConfigError: the rules of a stage change what boats see, or a setting, reward or opponent cannot be.
     """
 
-    def __init__(self, config: Learning, first: Any = None) -> None:
+    def __init__(self, config: Config, first: Any = None) -> None:
         self.config, self.stage, self._first = config, 0, first
         self.spent_s, self._ended = 0.0, []  # type: float, list[dict[str, float]]
         self.batch = self._games(0)
@@ -113,7 +105,7 @@ class TrainEnv(MctfVecEnv):
         super().__init__(self.batch)
         core, boats = self.batch.core, len(self.batch.boats)
         self._carriers, self._roles = carriers_of(core), np.tile(np.arange(boats), core.n_games)
-        told = getattr(config.net, "roles", "shared") != "shared"  # type: ignore[attr-defined]
+        told = config.net.roles != "shared"
         self._places = np.tile(np.eye(boats, dtype=np.float32), (core.n_games, 1)) if told else None
         if told:
             self.observation_space = Box(-1.0, 1.0, (core.n_obs + boats,), np.float32)
@@ -126,12 +118,12 @@ class TrainEnv(MctfVecEnv):
             core,
             pool_of(config, stage),
             shield=shield if config.shielded_training else None,
-            actions=getattr(config, "actions", "discrete"),
+            actions=config.actions,
             seed=config.seed,
             interval=config.interval,
             reward=WeightedSum(config.reward_weights(stage)),
         )
-        asked = AskedShield(batch, getattr(config, "shield_every", 1)) if config.shielded_training else None
+        asked = AskedShield(batch, config.shield_every) if config.shielded_training else None
         self._guard = (batch.shield, asked)
         return batch
 
@@ -250,16 +242,9 @@ class TrainEnv(MctfVecEnv):
         return found
 
     def put(self, saved: dict[str, np.ndarray], seed: int, pool: dict[str, Any], snapshots: Any) -> None:
-        """Go on where the arrays, and what the pool told, were taken in this stage.
+        """Go on where `arrays`, the batch's seed and `Pool.facts` were taken in this stage.
 
-        Args:
-            saved: copies of `arrays`.
-            seed: the batch's.
-            pool: `Pool.facts`.
-            snapshots: reads the network of a snapshot's name.
-
-        Raises:
-            ConfigError: they are those of another training.
+        ``snapshots`` reads the network of a snapshot's name.
         """
         self.play_as_stage_says()
         self.batch.opponent.remember(pool["members"], snapshots)

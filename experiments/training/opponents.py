@@ -19,22 +19,14 @@ from steerclear.shield.jit import Array, BoolArray
 from steerclear.shield.platforms import layout as L
 
 from ..entries.team import make_team
-from .config import SELF, Draws, Stage
+from .config import SELF, League, Stage
 
 LAST = 50
 """Games that a mean score is over."""
 
 
 def opponent_of(name: str, every: int = 1) -> Any:
-    """The batch policy of a name: those that play batches do, others play one game after another.
-
-    Args:
-        name: of the policy.
-        every: game steps between two questions to one that plays one game after another.
-
-    Raises:
-        PolicyError: there is none.
-    """
+    """The batch policy of a name: those that play batches do, others one game after another, asked every so often."""
     if plays_batches(name):
         return policies.make_batch(name)
     policies.check(name)
@@ -52,7 +44,7 @@ class Pool:
         every: game steps between two questions to members that play one game after another.
     """
 
-    def __init__(self, stage: Stage, league: Draws, seed: int, every: int = 1) -> None:
+    def __init__(self, stage: Stage, league: League, seed: int, every: int = 1) -> None:
         names = stage.opponents
         self.name = ",".join(names)
         self.league = league

@@ -155,9 +155,6 @@ def load_actor(policy: Any, network: Network) -> None:
     """Put the weights of a network for all boats into a policy's actor, whose hidden layers may be wider.
 
     What is wider adds units that nothing listens to yet, so that the actor does exactly what the network does.
-
-    Raises:
-        ValueError: of another shape.
     """
     names = [name for name in policy.state_dict() if name.startswith("mlp_extractor.policy_net")]
     keys = sorted({name.rsplit(".", 1)[0] for name in names}, key=lambda name: int(name.rsplit(".", 1)[1]))
@@ -171,11 +168,7 @@ def load_actor(policy: Any, network: Network) -> None:
 
 
 def _put_layer(weight: torch.Tensor, bias: torch.Tensor, given_w: Any, given_b: Any, ends: tuple[bool, bool]) -> None:
-    """Put a layer (in, out) into one (out, in) that is as wide or wider; not wider where it ``ends`` the network.
-
-    Raises:
-        ValueError: it does not fit.
-    """
+    """Put a layer (in, out) into one (out, in) that is as wide or wider; not wider where it ``ends`` the network."""
     (n_in, n_out), (rows, columns) = given_w.shape, weight.shape
     if columns < n_in or rows < n_out or (ends[0] and columns > n_in) or (ends[1] and rows > n_out):
         raise ValueError(f"a layer of shape {given_w.shape}, wanted {(columns, rows)}")
@@ -185,11 +178,7 @@ def _put_layer(weight: torch.Tensor, bias: torch.Tensor, given_w: Any, given_b: 
 
 
 def _one_network(network: Network, places: int) -> list[tuple[Any, Any]]:
-    """Weights (in, out) and bias (out,) of each layer; places, where told, are the first layer's last inputs.
-
-    Raises:
-        ValueError: it is a network per role.
-    """
+    """Weights (in, out) and bias (out,) of each layer; places, where told, are the first layer's last inputs."""
     shared = [(w, b) for w, b in zip(network.weights, network.biases, strict=True)]
     same = all((w == w[:1]).all() and (k == 0 or (b == b[:1]).all()) for k, (w, b) in enumerate(shared))
     if network.roles not in (1, places) or not same:

@@ -1,60 +1,82 @@
-"""`PpoTraining`: Stable-Baselines3's PPO on the games of a training, with a curriculum, a league and checkpoints."""
+"""`PpoTraining`: Stable-Baselines3's PPO on the games of a training, with a curriculum, a league and checkpoints.
+
+A checkpoint is a model as Stable-Baselines3 saves it, and the state of the games beside; none of its pickles is read.
+`TwoPartTraining` is QMIX for play, then PPO for what to do once the flag is held: Richley-NIWC-ATL's team.
+"""
 
 from __future__ import annotations
 
+import json
 import time
+import zipfile
+import zlib
 from collections import deque
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
-from steerclear.policies.entrants.learned.network import Network
-from steerclear.policies.entrants.learned.sb3_file import TAKES_OVER
-from steerclear.policies.entrants.learned.weights_file import joined, read_weights, write_weights
+from steerclear.env.whole_file import whole_file
+from steerclear.policies.entrants.learned.network import Network, joined, read_weights, write_weights
+from steerclear.policies.entrants.learned.sb3_file import TAKES_OVER, add_card
 from steerclear.shield.exceptions import ConfigError
 
-from .checkpoints import newest, read_checkpoint, write_checkpoint, write_model
-from .config import SELF, PpoConfig
+from .config import SELF, Config, PpoOptions, QmixOptions
 from .env import TrainEnv, carriers_of
 from .policy import ACTIVATIONS, BoatPolicy, TeamFeatures, features_of, load_actor, network_of
-from .training import DivergedError, Notice, Training, card_of, device_of, means, threads
+from .qmix import QmixTraining
+from .training import FINAL, DivergedError, Notice, Training, card_of, device_of, means, threads
 
-MODEL, SNAPSHOTS = "model.zip", "snapshots"
+MODEL, SNAPSHOTS, CHECKPOINTS, KEEP, PLAY = "model.zip", "snapshots", "checkpoints", 2, "play"
+FACTS, ARRAYS = "steerclear_training.json", "steerclear_games.npz"
 TOLD = ("r", "l", "captures", "captures_against", "grabs", "grabs_against", "tags", "tags_against", "hits")
 ONE_OF_TWO = "give weights of a single network, such as play/final.npz of a training by qmix+ppo"
 MAY_DIFFER = ("decisions", "checkpoint_every", "device")
 """Keys of a config that a training that is gone on with may have otherwise."""
+_DAMAGED = (zipfile.BadZipFile, KeyError, ValueError, OSError, EOFError, zlib.error)
 _NOT_OURS = (KeyError, ValueError, TypeError, IndexError, AttributeError, RuntimeError, OverflowError)
 """What putting back parts that are missing or of another kind raises."""
+
+
+class Kept(NamedTuple):
+    """What is written where a training stops: a checkpoint, and the curve until then."""
+
+    rollouts: int
+    checkpoint: bytes
+    curve: list[dict[str, Any]]
 
 
 class PpoTraining(Training):
     """A training by PPO in a folder.
 
-    Args:
-        config: what it is to be.
-        folder: where everything goes.
-        resume: go on from the folder's last checkpoint.
-
     Raises:
         ConfigError: an unusable setting or checkpoint.
     """
 
-    def __init__(self, config: PpoConfig, folder: Path, resume: bool = False) -> None:
+    def __init__(self, config: Config, folder: Path, resume: bool = False) -> None:
         super().__init__(config, folder)
-        self.first = _single(config.options.first, "first") if config.options.first else None
+        first = config.options.first
+        self.first = _single(first, "first") if first else None
         self.env = TrainEnv(config, self.first)
         self.core = self.env.batch.core
-        self._check_first()
+        needed = {"n_obs": self.core.n_obs, "interval": config.interval, "kind": "discrete"}
+        for name, value in needed.items() if self.first is not None else ():
+            if getattr(self.first, name) != value or config.actions != "discrete":
+                raise ConfigError(f"first: {first} has another {name} than the games, which need {value}")
         self.model = _ppo(config, self.env)
         self._card = {**card_of(config), TAKES_OVER: self.first is not None}
         if config.start:
-            _begin_with(self.model, config.start)
+            try:
+                load_actor(self.model.policy, _single(config.start, "start"))
+            except ConfigError:
+                raise  # a kind of ValueError
+            except ValueError as error:
+                words = f"start {config.start} does not fit this network: {error}; give its own net settings"
+                raise ConfigError(words) from None
         self.stage_began = self.rollouts = 0
         self._wall_s = 0.0
         self._recent: deque[float] = deque(maxlen=config.stages[0].games)
@@ -63,35 +85,26 @@ class PpoTraining(Training):
             self._resume()
         self._kept = self._packed()
 
-    def _check_first(self) -> None:
-        needed = {"n_obs": self.core.n_obs, "interval": self.config.interval, "kind": "discrete"}
-        for name, value in needed.items() if self.first is not None else ():
-            if getattr(self.first, name) != value or self.config.actions != "discrete":
-                raise ConfigError(
-                    f"first: {self.config.options.first} has another {name} than the games, which need {value}"
-                )
-
     def run(self, notice: Notice = lambda done, words: None) -> None:
-        """Train to the end; what is interrupted keeps all up to the last whole rollout.
-
-        Raises:
-            DivergedError: a number of the network or loss is not finite.
-        """
+        """Train to the end; what is interrupted keeps all up to the last whole rollout."""
         with threads(self.config.threads):
             try:
-                self._make_up_for_evaluation()
+                if self.curve and self._due() and "evaluation" not in self.curve[-1]:  # an error kept it from it
+                    self.curve[-1]["evaluation"] = self.evaluate()
+                    self._kept = self._packed()
                 left = self.total - self.decisions
                 if left > 0:
                     self.model.learn(left, _Rollouts(self, notice), None, reset_num_timesteps=False)
             except ValueError as error:  # torch's distributions refuse parameters that are not finite
                 if self._finite():
                     raise
-                raise DivergedError(_diverged()) from error
+                raise DivergedError("ppo.learning_rate or the reward weights") from error
             finally:
-                write_checkpoint(self.folder, self._kept[0])
-                self.write_curve(self._kept[1])
+                self._write_checkpoint()
+                self.write_curve(self._kept.curve)
         self.write_last()
-        write_model(self.model, self.folder / MODEL, self._card)
+        with whole_file(self.folder / MODEL, ConfigError) as part:
+            part.write_bytes(self._saved().getvalue())
 
     def end_rollout(self, wall: dict[str, float]) -> str:
         """Note what a rollout brought, go on in the curriculum and league, evaluate, keep; words for people."""
@@ -100,7 +113,7 @@ class PpoTraining(Training):
         self.model.logger.name_to_value.clear()
         self.model.logger.name_to_count.clear()
         if not np.isfinite(told.get("train/loss", 0.0)) or not self._finite():
-            raise DivergedError(_diverged())
+            raise DivergedError("ppo.learning_rate or the reward weights")
         self.rollouts += 1
         self.decisions = self.model.num_timesteps
         games = self.env.ended()
@@ -119,7 +132,7 @@ class PpoTraining(Training):
         row["wall"]["total_s"] = self._wall_s
         self._kept = self._packed()
         if self.rollouts % self.config.checkpoint_every == 0:
-            write_checkpoint(self.folder, self._kept[0])
+            self._write_checkpoint()
             self.write_curve(self.curve)
         return self._words(row, sum(wall.values()))
 
@@ -159,22 +172,25 @@ class PpoTraining(Training):
         """Whether this rollout ends with an evaluation."""
         return self.rollouts % self.config.evaluation.every == 0 or self.decisions >= self.total
 
-    def _make_up_for_evaluation(self) -> None:
-        """Play the evaluation that an error kept from the training that is gone on with."""
-        if self.curve and self._due() and "evaluation" not in self.curve[-1]:
-            self.curve[-1]["evaluation"] = self.evaluate()
-            self._kept = self._packed()
-
     def network(self) -> Network:
         """The actor as it is now, behind the network that plays until the flag is held, where there is one."""
         own = network_of(self.model.policy, self.config.net.activation, card_of(self.config))
         return own if self.first is None else joined(self.first, own, carriers_of(self.core))
 
-    def _packed(self) -> tuple[bytes, list[dict[str, Any]]]:
+    def _saved(self) -> BytesIO:
+        """The model with its card."""
+        file = BytesIO()
+        self.model.save(file)
+        add_card(file, self._card)
+        return file
+
+    def _packed(self) -> Kept:
         """A checkpoint of this moment, and the curve."""
         kind, keys, position, has_gauss, cached = np.random.get_state()  # noqa: NPY002 (SB3 shuffles with it)
+        arrays = {**self.env.arrays(), "torch": torch.get_rng_state().numpy(), "last_obs": self.model._last_obs}
+        arrays["starts"] = self.model._last_episode_starts
         facts = {
-            "settings": self.config.model_dump(mode="json"),
+            "settings": self.config.told(),
             "rollouts": self.rollouts,
             "decisions": self.decisions,
             "stage": self.env.stage,
@@ -187,25 +203,36 @@ class PpoTraining(Training):
             "rng": [kind, keys.tolist(), position, has_gauss, cached],
             "updates": self.model._n_updates,
             "curve": self.curve,
+            "names": list(arrays),
         }
-        own = {"torch": torch.get_rng_state().numpy(), "last_obs": self.model._last_obs}
-        own["starts"] = self.model._last_episode_starts
-        file = BytesIO()
-        write_model(self.model, file, self._card, facts, {**self.env.arrays(), **own})
-        return file.getvalue(), list(self.curve)
+        content, file = BytesIO(), self._saved()
+        np.savez(content, **{f"a{k}": array for k, array in enumerate(arrays.values())})
+        with zipfile.ZipFile(file, "a") as archive:
+            archive.writestr(FACTS, json.dumps(facts))
+            archive.writestr(ARRAYS, content.getvalue())
+        return Kept(self.rollouts, file.getvalue(), list(self.curve))
+
+    def _write_checkpoint(self) -> None:
+        """Write what is kept, then forget all but the last `KEEP` checkpoints."""
+        folder = self.folder / CHECKPOINTS
+        with whole_file(folder / f"{self._kept.rollouts:08d}.zip", ConfigError) as part:
+            part.write_bytes(self._kept.checkpoint)
+        for old in sorted(folder.glob("[0-9]*.zip"))[:-KEEP]:
+            old.unlink(missing_ok=True)
 
     def _resume(self) -> None:
-        """Go on from the last whole checkpoint.
-
-        Raises:
-            ConfigError: it is of another training or version, or damaged.
-        """
+        """Go on from the last whole checkpoint, where there is one."""
         path = newest(self.folder)
         if path is None:
             return
         facts, arrays = read_checkpoint(path)
         try:
-            self._check_same(facts["settings"])
+            for name, now in self.config.told().items():
+                if name not in MAY_DIFFER and now != facts["settings"].get(name):
+                    raise ConfigError(
+                        f"{self.folder} was begun with another {name}; resume with its own config.yaml, or name "
+                        "another --out"
+                    )
             self._put_back(path, facts, arrays)
         except ConfigError:
             raise  # a kind of ValueError; says already what to do
@@ -215,15 +242,6 @@ class PpoTraining(Training):
                 f"{path} is damaged or of another version ({why or type(error).__name__}); delete it to go on from the "
                 "one before, or begin anew in another --out"
             ) from error
-
-    def _check_same(self, before: dict[str, Any]) -> None:
-        now = self.config.model_dump(mode="json")
-        for name in now:
-            if name not in MAY_DIFFER and now[name] != before.get(name):
-                raise ConfigError(
-                    f"{self.folder} was begun with another {name}; resume with its own config.yaml, or name another "
-                    "--out"
-                )
 
     def _put_back(self, path: Path, facts: dict[str, Any], arrays: dict[str, np.ndarray]) -> None:
         """Go on from what `_packed` told."""
@@ -265,16 +283,13 @@ class _Rollouts(BaseCallback):
         return True
 
     def _on_rollout_start(self) -> None:
-        self._end()
+        self._on_training_end()
         self._began_s, self._played_s = time.perf_counter(), None
 
     def _on_rollout_end(self) -> None:
         self._played_s = time.perf_counter()
 
     def _on_training_end(self) -> None:
-        self._end()
-
-    def _end(self) -> None:
         if self._played_s is None:
             return
         learning_s = time.perf_counter() - self._played_s
@@ -285,11 +300,30 @@ class _Rollouts(BaseCallback):
         self._notice(self._training.decisions, words)
 
 
-def _diverged() -> str:
-    return "the loss is no longer finite; lower ppo.learning_rate or the reward weights, earlier work is kept"
+def newest(folder: Path) -> Path | None:
+    """The last checkpoint of a training; None where there is none."""
+    found = sorted((folder / CHECKPOINTS).glob("[0-9]*.zip"))
+    if not found and any((folder / CHECKPOINTS).glob("[0-9]*.npz")):
+        raise ConfigError(
+            f"{folder} holds a training of 0.8.0 or before, which only that version goes on with; its best.npz and "
+            "final.npz play here and can be the start of another (start), in another --out"
+        )
+    return found[-1] if found else None
 
 
-def _ppo(config: PpoConfig, env: TrainEnv) -> PPO:
+def read_checkpoint(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """Facts and arrays of a checkpoint."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            facts, content = json.loads(archive.read(FACTS)), BytesIO(archive.read(ARRAYS))
+        with np.load(content, allow_pickle=False) as found:
+            return facts, {name: found[f"a{k}"] for k, name in enumerate(facts["names"])}
+    except _DAMAGED as error:
+        why = " ".join(str(error).split())[:120] or type(error).__name__
+        raise ConfigError(f"{path} is no whole checkpoint ({why}); delete it to go on from the one before") from error
+
+
+def _ppo(config: Config, env: TrainEnv) -> PPO:
     """SB3's PPO of a config; the actor learns nothing while the critic learns alone."""
     ppo, net, batch = config.ppo, config.net, env.batch
     looks = {
@@ -334,21 +368,40 @@ def _ppo(config: PpoConfig, env: TrainEnv) -> PPO:
 
 
 def _single(path: str, what: str) -> Network:
-    """The network of a file that holds one.
-
-    Raises:
-        ConfigError: it holds two.
-    """
+    """The network of a file that holds one."""
     network = read_weights(path)
     if network.carrying is not None:
         raise ConfigError(f"{what} {path} holds two networks; {ONE_OF_TWO}")
     return network
 
 
-def _begin_with(model: PPO, path: str) -> None:
-    try:
-        load_actor(model.policy, _single(path, "start"))
-    except ConfigError:
-        raise  # a kind of ValueError
-    except ValueError as error:
-        raise ConfigError(f"start {path} does not fit this network: {error}; give its own net settings") from None
+class TwoPartTraining:
+    """QMIX in the folder ``play``, then PPO in the folder itself; resumed, a first part that is done is kept.
+
+    The first stage is QMIX's, all are PPO's; arguments and errors are as of `PpoTraining`.
+    """
+
+    def __init__(self, config: Config, folder: Path, resume: bool = False) -> None:
+        self.config, self.folder, self.resume = config, folder, resume
+        self.weights = folder / PLAY / FINAL
+        self.decisions, self.total = 0, config.decisions
+        self._of_play = max(1, int(config.options.play_share * config.decisions))
+        self._play = None
+        if not (resume and self.weights.exists()):
+            options = QmixOptions(**{name: getattr(config.options, name) for name in QmixOptions.model_fields})
+            own = {"algorithm": "qmix", "device": "auto", "stages": config.stages[:1], "decisions": self._of_play}
+            net = config.net.model_copy(update={"roles": "shared"})
+            play = config.model_copy(update={**own, "options": options, "net": net})
+            self._play = QmixTraining(play, folder / PLAY)
+        elif found := newest(folder):
+            self.decisions = self._of_play + int(read_checkpoint(found)[0]["decisions"])
+
+    def run(self, notice: Notice = lambda done, words: None) -> None:
+        """Train both parts to the end."""
+        if self._play is not None:
+            self._play.folder.mkdir(parents=True, exist_ok=True)
+            self._play.run(lambda done, words: notice(done, f"play, {words}"))
+        left = {"decisions": max(1, self.total - self._of_play), "options": PpoOptions(first=str(self.weights))}
+        second = PpoTraining(self.config.model_copy(update={"algorithm": "ppo", **left}), self.folder, self.resume)
+        second.run(lambda done, words: notice(self._of_play + done, f"with the flag, {words}"))
+        self.decisions = self.total

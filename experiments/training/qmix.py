@@ -15,11 +15,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import torch
 from steerclear.policies.entrants.learned.network import Network
-from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.wrappers.actions import DISCRETE
 from torch import nn
 
-from .config import QmixConfig
+from .config import Config
 from .env import TrainEnv
 from .policy import TeamFeatures, features_of, layers, numbers_of
 from .training import DivergedError, Notice, Training, card_of, threads
@@ -47,13 +46,7 @@ class Transitions(NamedTuple):
 
 
 class MonotoneMixer(nn.Module):
-    """The f_s above: one hidden layer of ELU with weights >= 0.
-
-    Args:
-        boats: n.
-        state: numbers in a state.
-        hidden: width.
-    """
+    """The f_s above for so many boats and numbers in a state: one hidden layer of ELU with weights >= 0."""
 
     def __init__(self, boats: int, state: int, hidden: int = 32) -> None:
         super().__init__()
@@ -72,14 +65,7 @@ class MonotoneMixer(nn.Module):
 
 
 class Qmix:
-    """Learner of values and mixer, with target networks and double Q-learning.
-
-    Args:
-        agent: network from what a boat sees to its actions' values.
-        mixer: of their values.
-        rate: of Adam.
-        discount: per decision.
-    """
+    """Learner of an agent (from what a boat sees to its actions' values) and mixer, with target networks, double Q."""
 
     def __init__(self, agent: nn.Module, mixer: nn.Module, rate: float, discount: float) -> None:
         self.agent, self.mixer, self.discount, self.updates = agent, mixer, discount, 0
@@ -112,20 +98,9 @@ class Qmix:
 
 
 class QmixTraining(Training):
-    """QMIX in a folder; checkpoints are not kept: it begins anew.
+    """QMIX in a folder: one network for all boats, discrete actions; checkpoints are not kept, it begins anew."""
 
-    Args:
-        config: the network is shared, actions are discrete.
-        folder: where everything goes.
-        resume: refused.
-
-    Raises:
-        ConfigError: ``resume``, or a setting that cannot be.
-    """
-
-    def __init__(self, config: QmixConfig, folder: Path, resume: bool = False) -> None:
-        if resume:
-            raise ConfigError("qmix begins anew; leave out --resume")
+    def __init__(self, config: Config, folder: Path, resume: bool = False) -> None:
         super().__init__(config, folder)
         torch.manual_seed(config.seed)
         self._rng = np.random.default_rng([config.seed, 9])
@@ -173,7 +148,7 @@ class QmixTraining(Training):
             for _ in range(options.updates):
                 loss = self.learner.update(self._replay.draw(options.batch, self._rng))
             if not np.isfinite(loss):
-                raise DivergedError("the loss is no longer finite; lower options.rate, earlier work is kept")
+                raise DivergedError("options.rate")
         return out.observations, loss
 
     def _exploration(self) -> float:

@@ -1,47 +1,314 @@
-"""Raids that learn: PPO over the numbers of a scripted raid, in games that begin where raids go to their next phase."""
+"""Raids that learn: PPO (Schulman et al. 2017) over the numbers of a scripted raid, which hold for a time.
+
+Games begin at moments at which raids of the script go to a phase or take the flag: a raid ends in a capture more often
+the nearer to one it begins, and of games that begin as usual hardly any second teaches how a flag is brought home
+(Salimans and Chen, "Learning Montezuma's Revenge from a Single Demonstration", 2018).
+"""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from steerclear.policies.entrants.learned.network import Network
+import torch
+from numpy.typing import NDArray
+from steerclear.policies.entrants.learned.network import Features, Network, read_weights, write_weights
 from steerclear.policies.entrants.learned.raids import BOATS, SEEN, RaidsBatch
-from steerclear.policies.entrants.learned.weights_file import read_weights, write_weights
-from steerclear.policies.entrants.undertow.raid import Phase
+from steerclear.policies.entrants.undertow.raid import Phase, Raid
+from steerclear.policies.entrants.undertow.shape import NAMES
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array, BoolArray
+from steerclear.shield.platforms import layout as L
+from torch import nn
 
-from .config import RaidsConfig
-from .env import TrainEnv
-from .raid_starts import BeginInRaids, StartStates, recorded
-from .raids_learner import NONE, Answer, RaidsLearner
-from .training import FINAL, Notice, Training, card_of, means, threads
+from .config import Config
+from .env import TrainEnv, core_of, pool_of, set_tags, shield_of
+from .opponents import Pool
+from .policy import ACTIVATIONS, numbers_of
+from .training import FINAL, DivergedError, Notice, Training, card_of, device_of, means, threads
 
+PLACE = (
+    *("state", "previous_position", "error_is_float32", "is_tagged", "is_disabled", "has_flag", "oob", "on_side"),
+    *("driven", "tagging_cooldown_s", "touching", "contact", "flag_position", "flag_taken"),
+)
+"""Arrays of a game that say how it stands; clocks, scores and random numbers are the new game's own."""
+TURNED = (L.RUDDER, L.HEADING_ERROR, L.HEADING_INTEGRAL, L.TURN_RATE)
+"""Numbers of a boat's state that change their sign in a mirror."""
+KINDS = ("bait", "drag", "run", "flag", "alone", "alone_flag")
+"""What a raid goes on to at a moment: its phases, and that it has taken the flag; the last two of boats alone."""
 LONGEST_S = 100.0
 """Time until a game that began in a raid is over, s."""
 RECORDED_SEED = 810_000
 """First seeds of the games that moments are recorded from are multiples of it."""
 COUNTS = ("captures", "captures_against", "grabs", "grabs_against", "hits")
+NONE = Features(np.zeros(0, np.int64), np.zeros(0, np.int64), 0.0)
+CRITIC_RATE, FIRST_GAIN = 1e-3, 1e-3
+Floats = NDArray[np.float32]
+Moment = tuple[dict[str, Array], list[float], int, str]
+"""Arrays of `PLACE`, what the raid remembered, number in `KINDS`, name of the opponent."""
+
+
+class Recorder(RaidsBatch):
+    """Raids of the script's numbers, changed at random, and the moments at which they go on (``found``).
+
+    Args:
+        interval: game steps for which a decision is held.
+        spread: deviation of the numbers, in units of `shape.LIMITS`.
+        seed: of the draws.
+        pool: of the opponents.
+    """
+
+    def __init__(self, interval: int, spread: float, seed: int, pool: Pool) -> None:
+        rng = np.random.default_rng([seed, 12])
+        drawn: Any = SimpleNamespace(interval=interval)  # stands for a network: the script's numbers and some noise
+        drawn.outputs = lambda seen, roles: spread * rng.normal(size=(len(seen), len(NAMES)))
+        self.network, self.name, self._team = drawn, "recorder", -1
+        self.found: list[Moment] = []
+        self._pool = pool
+
+    def _asks(self, game: int) -> bool:
+        before = self._stood[game]
+        asks = super()._asks(game)
+        raid = self.raids[game]
+        by_numbers = raid.phase > Phase.GATHER and raid.passage is None  # habits that a passage rests on are not kept
+        if self._stood[game] != before and by_numbers:
+            place = {name: getattr(self._core.games, name)[game].copy() for name in PLACE}
+            kind = KINDS.index("flag") if raid.held else raid.phase - 1
+            if raid.unguarded:
+                kind = KINDS.index("alone_flag" if raid.held else "alone")
+            memory = raid.memory(float(self._core.time_s[game]))
+            self.found.append((place, memory, kind, self._pool.playing[game]))
+        return asks
+
+
+def recorded(config: Config, spread: float, seed: int) -> list[Moment]:
+    """Moments of as many games as a training plays at once, with its rules and shield, against its opponents."""
+    stage = config.stages[0]
+    core = core_of(config, config.games, seed, stage)
+    set_tags(core, stage)
+    core.reset(seed=seed)
+    foe = pool_of(config.model_copy(update={"seed": seed}), stage)
+    recorder = Recorder(config.interval, spread, seed, foe)
+    recorder.reset(core, 0, seed)
+    foe.reset(core, 1, seed + 1)
+    shielded = config.shielded_training and stage.shielded
+    command_filter = shield_of(config, core, stage=stage).filter_for(0) if shielded else None
+    commands = np.zeros((core.n_games, core.n_boats, 2))
+    own, others = np.flatnonzero(core.team == 0), np.flatnonzero(core.team == 1)
+    while not (core.terminated | core.truncated).all():
+        commands[:, own], commands[:, others] = recorder.act(core, 0), foe.act(core, 1)
+        core.step(commands, command_filter)
+    return recorder.found
+
+
+class BeginInRaids:
+    """Stands for a core's ``reset``: games begin at moments of raids, half of them mirrored.
+
+    Args:
+        core: the games.
+        moments: to draw from.
+        shares: how often each of `KINDS` comes.
+        seed: of the draws.
+
+    Attributes:
+        drawn: (B,) number of the moment that each game began with.
+        mirrored: (B,) whether it was mirrored.
+
+    Raises:
+        ConfigError: of some kind that has a share there is no moment.
+    """
+
+    def __init__(self, core: Any, moments: Sequence[Moment], shares: Sequence[float], seed: int) -> None:
+        kinds = np.array([moment[2] for moment in moments])
+        self._of_kind = [np.flatnonzero(kinds == number) for number in range(len(KINDS))]
+        for name, share, some in zip(KINDS, shares, self._of_kind, strict=True):
+            if share and not some.size:
+                raise ConfigError(
+                    f"no raid came to {name!r} in the games recorded; give more games, longer ones (max_time_s), or 0 "
+                    "as its share (options.shares)"
+                )
+        self._core, self._reset, self.moments = core, core.reset, moments
+        self._shares = np.array(shares) / np.sum(shares)
+        self._rng = np.random.default_rng([seed, 11])
+        self.drawn, self.mirrored = np.zeros(core.n_games, np.int64), np.zeros(core.n_games, np.bool_)
+        core.reset = self
+
+    def __call__(self, mask: BoolArray | None = None, seed: int | None = None) -> Any:
+        """As `BatchedMctf.reset`."""
+        self._reset(mask=mask, seed=seed)
+        for game in np.flatnonzero(np.ones(self._core.n_games, np.bool_) if mask is None else mask):
+            fit = self._of_kind[self._rng.choice(len(KINDS), p=self._shares)]
+            self.drawn[game] = fit[self._rng.integers(fit.size)]
+            for name, array in self.moments[self.drawn[game]][0].items():
+                getattr(self._core.games, name)[game] = array
+            self.mirrored[game] = self._rng.random() < 0.5
+            if self.mirrored[game]:
+                mirror(self._core, game)
+        return self._core.observe()
+
+    def remind(self, raid: Raid, game: int) -> None:
+        """Let a raid go on where the moment of its game was taken."""
+        memory = self.moments[self.drawn[game]][1]
+        raid.remember(memory, float(self._core.time_s[game]), bool(self.mirrored[game]))
+
+    def opponent(self, game: int) -> str:
+        """Whom the moment of a game was recorded against."""
+        return self.moments[self.drawn[game]][3]
+
+
+def mirror(core: Any, game: int) -> None:
+    """Turn a game's south and north round."""
+    games, height_m = core.games, core.config.env_bounds_m[1]
+    state = games.state[game]
+    state[:, L.Y] = height_m - state[:, L.Y]
+    state[:, L.HEADING] = (360.0 - state[:, L.HEADING]) % 360.0 - 180.0
+    state[:, TURNED] *= -1.0
+    games.previous_position[game, :, 1] = height_m - games.previous_position[game, :, 1]
+    games.flag_position[game, :, 1] = height_m - games.flag_position[game, :, 1]
+
+
+@dataclass
+class Answer:
+    """What was seen and answered, and what came of it until the next.
+
+    Attributes:
+        seen: (n,) what the network was told.
+        units: (k,) drawn.
+        chance: logarithm of the density of that.
+        earned: discounted reward until the next answer.
+        decisions: time until then.
+        after: what it was told then; None: the game, or the raid that it began with, was over.
+    """
+
+    seen: Floats
+    units: Floats
+    chance: float
+    earned: float = 0.0
+    decisions: int = 0
+    after: Floats | None = None
+
+
+class RaidsLearner:
+    """Actor and critic; what is drawn about the actor's answers deviates in units of `shape.LIMITS`."""
+
+    def __init__(self, config: Config) -> None:
+        torch.manual_seed(config.seed)
+        self._config, self._learned = config, 0
+        self._device = device_of(config.device)
+        self._rng = np.random.default_rng([config.seed, 21])
+        self.actor, self.critic = _network(config, len(NAMES)), _network(config, 1)
+        self.spread = nn.Parameter(torch.full((len(NAMES),), float(np.log(config.options.spread))))
+        for part in (self.actor, self.critic):
+            part.to(self._device)
+        rate = config.ppo.learning_rate
+        self._optimiser = torch.optim.Adam([*self.actor.parameters(), self.spread], lr=rate, eps=1e-5)
+        self._critics = torch.optim.Adam(self.critic.parameters(), lr=CRITIC_RATE, eps=1e-5)
+
+    def begin_with(self, network: Network) -> None:
+        """Put the weights of a network of the same shape into the actor."""
+        layers = [layer for layer in self.actor if isinstance(layer, nn.Linear)]
+        shapes = [tuple(reversed(layer.weight.shape)) for layer in layers]
+        if [weight.shape for weight in network.weights] != [(1, *shape) for shape in shapes]:
+            raise ConfigError(f"start does not fit this network of layers {shapes}; give its own net settings")
+        with torch.no_grad():
+            for layer, weight, bias in zip(layers, network.weights, network.biases, strict=True):
+                layer.weight.copy_(torch.as_tensor(weight[0].T))
+                layer.bias.copy_(torch.as_tensor(bias[0]))
+
+    def answers(self, seen: Floats) -> list[Answer]:
+        """Drawn answers to what is seen (N, n)."""
+        with torch.no_grad():
+            mean, spread = self.actor(self._tensor(seen)).cpu().numpy(), self.spread.exp().cpu().numpy()
+        noise = self._rng.normal(size=mean.shape)
+        units = (mean + spread * noise).astype(np.float32)
+        chances = (-0.5 * noise**2 - np.log(spread)).sum(axis=1)
+        return [Answer(*one) for one in zip(seen, units, chances.tolist(), strict=True)]
+
+    def learn(self, games: Sequence[Sequence[Answer]]) -> dict[str, float]:
+        """Learn from a rollout's answers, of each game in order; what there is to tell."""
+        answers = [answer for game in games for answer in game]
+        seen = self._tensor(np.stack([one.seen for one in answers]))
+        units = self._tensor(np.stack([one.units for one in answers]))
+        chances = self._tensor(np.array([one.chance for one in answers], np.float32))
+        gains, values = self._gains(games, answers, seen)
+        wanted, gain = self._tensor(gains + values), self._tensor((gains - gains.mean()) / (gains.std() + 1e-8))
+        ppo, further, far = self._config.ppo, self._learned >= self._config.ppo.critic_first, [0.0]
+        for _ in range(ppo.epochs):
+            for some in torch.as_tensor(self._rng.permutation(len(answers))).split(ppo.batch):
+                self._step(self._critics, ((self.critic(seen[some])[:, 0] - wanted[some]) ** 2).mean())
+                if further:
+                    far.append(self._improve(seen[some], units[some], chances[some], gain[some]))
+            further = further and float(np.mean(far[-3:])) <= self._config.options.furthest
+        self._learned += 1
+        spread = float(self.spread.detach().exp().mean())
+        explained = 1.0 - float(np.mean(gains**2) / (np.var(gains + values) + 1e-9))
+        return {"answers": len(answers), "explained": explained, "divergence": far[-1], "spread": spread}
+
+    def _gains(self, games: Any, answers: Sequence[Answer], seen: Any) -> tuple[Floats, Floats]:
+        """Advantages by GAE over times of different lengths, and values, of all answers."""
+        ppo = self._config.ppo
+        after = self._tensor(np.stack([one.seen if one.after is None else one.after for one in answers]))
+        with torch.no_grad():
+            values, later = (self.critic(told)[:, 0].cpu().numpy() for told in (seen, after))
+        gains, at = np.zeros(len(answers), np.float32), len(answers)
+        for game in reversed(games):
+            last = 0.0
+            for one in reversed(game):
+                at -= 1
+                left = 0.0 if one.after is None else ppo.discount**one.decisions
+                last = one.earned + left * later[at] - values[at] + left * ppo.gae_lambda * last
+                gains[at] = last
+        return gains, values
+
+    def _improve(self, seen: Any, units: Any, chances: Any, gain: Any) -> float:
+        """A step of the actor; how far it is from who answered."""
+        ppo = self._config.ppo
+        now = (-0.5 * ((units - self.actor(seen)) / self.spread.exp()) ** 2 - self.spread).sum(1)
+        ratio = torch.exp(now - chances)
+        kept = torch.minimum(ratio * gain, ratio.clamp(1.0 - ppo.clip, 1.0 + ppo.clip) * gain)
+        self._step(self._optimiser, -kept.mean() - ppo.entropy * self.spread.sum())
+        return float((ratio - 1.0 - (now - chances)).mean().detach())
+
+    def _step(self, optimiser: Any, loss: Any) -> None:
+        if not torch.isfinite(loss):
+            raise DivergedError("ppo.learning_rate")
+        optimiser.zero_grad()
+        loss.backward()
+        for group in optimiser.param_groups:
+            nn.utils.clip_grad_norm_(group["params"], self._config.ppo.max_grad_norm)
+        optimiser.step()
+
+    def _tensor(self, numbers: Any) -> Any:
+        return torch.as_tensor(np.asarray(numbers, np.float32), device=self._device)
+
+    def network(self, card: dict[str, Any]) -> Network:
+        """The actor in numpy."""
+        weights, biases = numbers_of(self.actor)
+        config, n = self._config, weights[0].shape[1]
+        return Network(weights, biases, NONE, config.net.activation, "raids", config.interval, n, card)
+
+
+def _network(config: Config, outputs: int) -> nn.Sequential:
+    """Layers; the last begins near nothing, so that raids begin as the script's."""
+    found: list[nn.Module] = []
+    for before, after in pairwise((SEEN, *config.net.hidden, outputs)):
+        found += [nn.Linear(before, after), ACTIVATIONS[config.net.activation]()]
+        nn.init.orthogonal_(found[-2].weight, 2.0**0.5)
+        nn.init.zeros_(found[-2].bias)
+    nn.init.orthogonal_(found[-2].weight, FIRST_GAIN)
+    return nn.Sequential(*found[:-1])
 
 
 class RaidsTraining(Training):
-    """A training of raids in a folder; checkpoints are not kept: it begins anew.
+    """A training of raids in a folder, a decision being one of a team; checkpoints are not kept: it begins anew."""
 
-    Args:
-        config: what it is to be; a decision is one of a team.
-        folder: where everything goes.
-        resume: refused.
-
-    Raises:
-        ConfigError: teams not of three boats, ``resume``, or a setting that cannot be.
-    """
-
-    def __init__(self, config: RaidsConfig, folder: Path, resume: bool = False) -> None:
-        if resume:
-            raise ConfigError("raids begin anew; leave out --resume")
+    def __init__(self, config: Config, folder: Path, resume: bool = False) -> None:
         if config.game(config.stages[0]).team_size != BOATS:
             raise ConfigError(f"raids are for teams of {BOATS} boats; leave out team_size")
         super().__init__(config, folder)
@@ -78,7 +345,7 @@ class RaidsTraining(Training):
             found += recorded(self.config, spread, part * RECORDED_SEED + seed)
             notice(0, f"moments recorded in {part * self._all.size} games")
         core, shares = self.batch.core, self.config.options.shares
-        self._begun = BeginInRaids(core, StartStates.of(found, shares), shares, seed)
+        self._begun = BeginInRaids(core, found, shares, seed)
         self.env.play_as_stage_says()
         self.batch.reset(seed)
         self.team.reset(core, 0, seed)
@@ -167,8 +434,8 @@ class RaidsTraining(Training):
         if not over.any():
             return
         self.team.restart(over, 0)
-        self.pool.playing[over] = self._begun.moments.opponent[self._begun.drawn[over]]
         for game in np.flatnonzero(over):
+            self.pool.playing[game] = self._begun.opponent(game)
             self._begun.remind(self.team.raids[game], int(game))
 
     def _totals(self, episodes: Any, over: BoolArray) -> list[dict[str, float]]:

@@ -45,40 +45,39 @@ def _remembered(before: Array | None, now: Array, games: BoolArray) -> Array:
     return kept
 
 
-class Tagged:
-    """-1 to a boat that has just been tagged, or left the field."""
+class Changed:
+    """A term of what the last game step changed in a fact of the core about boats.
+
+    Args:
+        fact: name of the array.
+        earned: (B, n) from the batch and that fact, before and now.
+    """
 
     before: Array | None = None
 
+    def __init__(self, fact: str, earned: Callable[[Any, BoolArray, BoolArray], Array]) -> None:
+        self._fact, self._earned = fact, earned
+
     def begin(self, batch: Any, games: BoolArray) -> None:
-        """Remember who is tagged."""
-        self.before = _remembered(self.before, batch.core.is_tagged[:, batch.boats], games)
+        """Remember it."""
+        self.before = _remembered(self.before, getattr(batch.core, self._fact)[:, batch.boats], games)
 
     def reward(self, batch: Any, changed: BoolArray) -> Array:
         """(B, n) of the last game step."""
-        before, self.before = self.before, batch.core.is_tagged[:, batch.boats]
-        return -(self.before & ~before).astype(float)
+        before, self.before = self.before, getattr(batch.core, self._fact)[:, batch.boats]
+        return self._earned(batch, before, self.before)
 
 
-class Own:
+def _own(batch: Any, before: BoolArray, now: BoolArray) -> Array:
     """+1 to the boat that grabs, +2 to the one that brings the flag home, -1 to the one that loses it.
 
     Credit for who did it. A lost flag costs the grab's prize: else boats that grab in turn and never come home earn
     more than those that do.
     """
-
-    before: Array | None = None
-
-    def begin(self, batch: Any, games: BoolArray) -> None:
-        """Remember who carries."""
-        self.before = _remembered(self.before, batch.core.has_flag[:, batch.boats], games)
-
-    def reward(self, batch: Any, changed: BoolArray) -> Array:
-        """(B, n) of the last game step."""
-        before, self.before = self.before, batch.core.has_flag[:, batch.boats]
-        given = before & ~self.before
-        home = given & (batch.core.events[:, batch.team, 0] > 0)[:, None]
-        return (self.before & ~before) + 2.0 * home - (given & ~home)
+    given = before & ~now
+    home = given & (batch.core.events[:, batch.team, 0] > 0)[:, None]
+    earned: Array = (now & ~before) + 2.0 * home - (given & ~home)
+    return earned
 
 
 class Progress:
@@ -163,10 +162,10 @@ TERMS: dict[str, Callable[[], Any]] = {
     "progress": Progress,
     "advance": Advance,
     "denied": Denied,
-    "own": Own,
+    "own": lambda: Changed("has_flag", _own),
     "tags": lambda: Term(lambda batch, changed: _net(batch, 2)),
     "tagging": lambda: Term(lambda batch, changed: (batch.core.made_tag[:, batch.boats] >= 0).astype(float)),
-    "tagged": Tagged,
+    "tagged": lambda: Changed("is_tagged", lambda batch, before, now: -(now & ~before).astype(float)),
     "collision": lambda: Term(lambda batch, changed: -batch.core.new_collisions[:, batch.boats].astype(float)),
     "intervention": lambda: Term(lambda batch, changed: -changed.astype(float)),
 }

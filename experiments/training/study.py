@@ -10,16 +10,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from steerclear.policies.entrants.learned import read_weights
 from steerclear.shield.exceptions import ConfigError
 
+from ..markdown import MADE, line, table
+from ..metrics import Metric
 from ..result_files import finite, lock_folder, read_json, told_settings
 from ..runner import EXPERIMENT_FILE, RESULTS_FILE, ROWS_FILE, Experiment, Interrupted, execute
+from ..statistics import Interval, difference, figure, student_interval
 from ..workers import Job, Row, end_failed
-from .config import PpoConfig
-from .config_file import config_of
-from .evaluation import play_games, summary_of
-from .training import CURVE, FINAL, training_of
+from .config import SHIELDS, Config, config_of
+from .training import CURVE, FINAL, play_games, summary_of, training_of
 
 COMMAND = "train-study"
 COLLISION = {"off": 0.0, "on": 0.25}
@@ -31,19 +33,29 @@ PLAYED_WITH = {
 }
 """By the shield in training, the cells of the study that its network plays."""
 
+NET = Metric("nets", "mean", "net captures", "", "captures for less against")
+HITS = Metric("hit_counts", "count", "hits", "", "new collisions of the team's boats")
+HEADS = (
+    "shield", "collision term", NET.label, "of each training", "captures", "against", HITS.label, "steps changed",
+)  # fmt: skip
+LEARNING = ("shield in training", "collision term", "1st quarter", "2nd", "3rd", "4th", HITS.label)
+CHANGES = {
+    "nothing to collision term alone": (("none", "off"), ("none", "on")),
+    **{f"nothing to shield, {shield}": (("none", "off"), (shield, "off")) for shield in SHIELDS[1:]},
+    **{f"shield, deployment to shield, {one}": (("deployment", "off"), (one, "off")) for one in SHIELDS[2:]},
+}
+"""What is compared, by trainings of the same seed: shield and collision term before and after."""
+Cells = Mapping[tuple[str, str], pd.DataFrame]
 
-def trainings_of(base: PpoConfig, folder: Path, seeds: int, games: int) -> list[Job]:
-    """A job per training: its folder, its whole config, and what its network is played with.
 
-    Raises:
-        ConfigError: the config is not of PPO.
-    """
+def trainings_of(base: Config, folder: Path, seeds: int, games: int) -> list[Job]:
+    """A job per training: its folder, its whole config, and what its network is played with."""
     if base.algorithm != "ppo":
         raise ConfigError(f"a study is of algorithm: ppo; the config has {base.algorithm}")
     return [
         {
             "folder": str(folder.resolve() / f"{shield.replace('+', '_')}-collision_{collision}-seed_{seed}"),
-            "config": config_of_training(base, shield, weight, seed).model_dump(mode="json"),
+            "config": config_of_training(base, shield, weight, seed).told(),
             "cells": [{"shield": one, "collision": collision, "seed": seed} for one in played_with],
             "games": games,
         }
@@ -53,7 +65,7 @@ def trainings_of(base: PpoConfig, folder: Path, seeds: int, games: int) -> list[
     ]
 
 
-def config_of_training(base: PpoConfig, shield: str, collision: float, seed: int) -> PpoConfig:
+def config_of_training(base: Config, shield: str, collision: float, seed: int) -> Config:
     """The base's settings with a shield mode, a weight of the collision term and a seed of its own."""
     rewards = {name: weight for name, weight in base.rewards.items() if name not in ("collision", "intervention")}
     rewards |= {"collision": collision} if collision else {}
@@ -80,15 +92,7 @@ def train_and_play(job: Job) -> list[Row]:
 
 
 def learning_of(curve: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """How fast a training learned, and what it cost: means per game that ended in it.
-
-    Args:
-        curve: rows of a training.
-
-    Returns:
-        ``learned``: captures for less against in each quarter of its decisions, None where no game ended;
-        ``training_hits``: over all of it.
-    """
+    """How fast a training learned, and what it cost: means per game that ended in it."""
     ended, end = [row for row in curve if row["games"]], curve[-1]["decisions"]
     quarters: list[list[Mapping[str, Any]]] = [[] for _ in range(4)]
     for row in ended:
@@ -103,7 +107,7 @@ def _mean(rows: Sequence[Mapping[str, Any]], name: str) -> float:
 
 
 def run_study(
-    base: PpoConfig, folder: Path, seeds: int, games: int, notice: Callable[[int, int], None], jobs: int = 1
+    base: Config, folder: Path, seeds: int, games: int, notice: Callable[[int, int], None], jobs: int = 1
 ) -> dict[str, Any]:
     """Train and play every cell, write the results; what a folder holds already is taken from there.
 
@@ -114,15 +118,9 @@ def run_study(
         games: played per cell and held-out opponent, not seen in training.
         notice: told how many trainings are done and how many there are.
         jobs: trainings at once, a process each.
-
-    Raises:
-        ConfigError: the config is not of PPO; the folder holds a study of another config; or a training failed: the
-            others are finished before.
-        JobFault: one failed by a fault of steerclear.
-        Interrupted: by Ctrl-C or SIGTERM; the results of what is done are written.
     """
     trainings = trainings_of(base, folder, seeds, games)
-    settings = {"seeds": seeds, "games": games, "training": base.model_dump(mode="json")}
+    settings = {"seeds": seeds, "games": games, "training": base.told()}
     _check_same(told_settings(settings)["training"], folder)
     experiment = Experiment(COMMAND, settings, trainings, train_and_play, "trainings")
     begun = any((folder / name).exists() for name in (ROWS_FILE, RESULTS_FILE))
@@ -139,11 +137,7 @@ def run_study(
 
 
 def _check_same(training: Mapping[str, Any], folder: Path) -> None:
-    """Refuse a folder whose trainings are of other settings: its networks would count as those of this config.
-
-    Raises:
-        ConfigError: they are.
-    """
+    """Refuse a folder whose trainings are of other settings: its networks would count as those of this config."""
     for name in (EXPERIMENT_FILE, RESULTS_FILE):
         if not (folder / name).exists():
             continue
@@ -156,3 +150,93 @@ def _check_same(training: Mapping[str, Any], folder: Path) -> None:
             raise ConfigError(
                 f"{folder} holds a study of another config ({', '.join(other)}); give its own, or name another --out"
             )
+
+
+def learning_page(found: Sequence[Mapping[str, Any]], folder: Path) -> tuple[str, str, list[Path]]:
+    """File name, text and pictures of the page."""
+    lines = ["# Learning with a shield beside the reward", "", MADE, ""]
+    for content in found:
+        rows = pd.DataFrame(content["rows"])
+        lines += [_what_was_done(content["settings"], rows), ""]
+        for opponent, mine in rows.groupby("opponent", sort=False):
+            lines += [f"## Against {line(opponent)}", "", *_against(_cells(mine))]
+        if "learned" in rows:
+            lines += _while_learning(_cells(rows[rows["opponent"] == rows["opponent"].iloc[0]]))
+    return "learning.md", "\n".join(lines), []
+
+
+def _what_was_done(settings: Mapping[str, Any], rows: pd.DataFrame) -> str:
+    training = settings["training"]
+    counts = rows.groupby(["shield", "collision", "opponent"]).size()
+    fewest, most = counts.min(), counts.max()
+    trainings = f"{most} training(s)" if fewest == most else f"{fewest} or {most} trainings"
+    pool = dict.fromkeys(name for stage in training.get("stages", []) for name in stage["opponents"])
+    learned = f" against {line(', '.join(pool))}" if pool else ""
+    rules = ", ".join(f"{name} {value}" for name, value in training.get("rules", {}).items())
+    return (
+        f"{trainings} a cell, of {training['decisions']:,} decisions of a boat, each held for "
+        f"{training['interval']} game steps{learned}, on {line(training['preset'])}"
+        f"{line(f' with {rules}') if rules else ''}; in training the shield is asked every "
+        f"{training.get('shield_every', 1)} game step(s), afterwards in each. Then {settings['games']} games a "
+        "training and opponent from the same seeds. Means per game; brackets are 95 % intervals, over games for what "
+        "each training brought (bootstrap; hits: exact Poisson limits), over trainings (Student's t) for what another "
+        "training would bring. Hits are counted per boat, at the game's distance."
+    )
+
+
+def _cells(rows: pd.DataFrame) -> Cells:
+    """Trainings by shield and collision term, in the order of the tables."""
+    found = dict(iter(rows.groupby(["shield", "collision"])))
+    return {key: found[key] for shield in SHIELDS for key in ((shield, "off"), (shield, "on")) if key in found}
+
+
+def _games(cell: pd.DataFrame) -> pd.DataFrame:
+    """One line per game of some trainings."""
+    return cell[["nets", "hit_counts"]].explode(["nets", "hit_counts"], ignore_index=True).astype(float)
+
+
+def _text(one: Interval, sign: str = "") -> str:
+    limits = f" ({one.low:{sign}.2f} to {one.high:{sign}.2f})" if np.isfinite(one.low) else ""
+    return f"{one.value:{sign}.2f}{limits}"
+
+
+def _against(cells: Cells) -> list[str]:
+    """Every cell; the same networks without a shield and with one at deployment; what changes bring."""
+    rows = []
+    for (shield, collision), cell in cells.items():
+        net, hits = (figure(_games(cell), metric)[0] for metric in (NET, HITS))
+        each = ", ".join(f"{np.mean(nets):+.2f}" for nets in cell["nets"])
+        captures, against, changed = cell[["captures", "captures_against", "interventions"]].mean()
+        told = [f"{captures:.2f}", f"{against:.2f}", _text(hits), f"{changed:.2f}"]
+        rows.append([shield, collision, _text(net, "+"), each, *told])
+    lines = [*table(HEADS, rows), ""]
+    for collision in ("off", "on"):
+        games = [_games(cells[key]) for key in (("none", collision), ("deployment", collision)) if key in cells]
+        if len(games) == 2 and len(games[0]) == len(games[1]) > 1:
+            pairs = games[0].add_suffix("_a").join(games[1].add_suffix("_b"))
+            less_net, less_hits = (_text(difference(pairs, metric)[0], "+") for metric in (NET, HITS))
+            lines += [
+                f"Shield at deployment less none, same networks and starts, game by game, collision term {collision}: "
+                f"net captures {less_net}, hits {less_hits} a game.",
+                "",
+            ]
+    changes = []
+    for words, (before, after) in CHANGES.items():
+        if before in cells and after in cells and len(cells[before]) == len(cells[after]):
+            means = [cells[key][["nets", "hit_counts"]].map(np.mean).to_numpy() for key in (before, after)]
+            changes.append([words, *(_text(student_interval(one), "+") for one in (means[1] - means[0]).T)])
+    return [*lines, *table(("change", NET.label, HITS.label), changes), ""]
+
+
+def _while_learning(cells: Cells) -> list[str]:
+    """How fast teams learned: the games of the trainings themselves."""
+    rows = []
+    for (shield, collision), cell in cells.items():
+        if shield != "deployment":
+            quarters = pd.DataFrame(list(cell["learned"]), dtype=float).mean()
+            hits = cell["training_hits"].astype(float).mean()
+            told = ["-" if np.isnan(one) else f"{one:+.2f}" for one in quarters]
+            rows.append([shield, collision, *told, "-" if np.isnan(hits) else f"{hits:.2f}"])
+    words = "Net captures a game in each quarter of the training's decisions, and hits a game over all of it, in the "
+    words += "games learned in; means of the trainings."
+    return ["## While learning", "", words, "", *table(LEARNING, rows), ""]

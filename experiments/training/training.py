@@ -1,9 +1,9 @@
-"""`Training`: what all algorithms share: a folder with a curve and weights, evaluations, and `training_of`."""
+"""`Training`: what all algorithms share: a folder with a curve and weights, games for evaluation, and `training_of`."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import find_spec
@@ -12,13 +12,17 @@ from typing import Any
 
 import numpy as np
 from steerclear.env.whole_file import whole_file
-from steerclear.policies.entrants.learned.network import Network
-from steerclear.policies.entrants.learned.weights_file import write_weights
+from steerclear.policies.entrants.learned import batch_of
+from steerclear.policies.entrants.learned.network import Network, write_weights
 from steerclear.shield.exceptions import ConfigError, SteerclearError
+from steerclear.shield.wrappers.tallies import EVENTS, Tallies, changed_by
 
 from ..provenance import machine, versions
 from ..result_files import told_settings, write_table
-from .evaluation import evaluation_of
+from ..statistics import mean_interval
+from .config import Config
+from .env import core_of, shield_of
+from .opponents import opponent_of
 
 BEST, FINAL, CURVE, TENSORBOARD = "best.npz", "final.npz", "curve.json", "tensorboard"
 Notice = Callable[[int, str], None]
@@ -26,7 +30,7 @@ Notice = Callable[[int, str], None]
 MADE_BY = {
     "ppo": ("ppo", "PpoTraining"),
     "qmix": ("qmix", "QmixTraining"),
-    "qmix+ppo": ("two_part", "TwoPartTraining"),
+    "qmix+ppo": ("ppo", "TwoPartTraining"),
     "cloning": ("cloning", "CloningTraining"),
     "raids": ("raids", "RaidsTraining"),
 }
@@ -35,13 +39,14 @@ MADE_BY = {
 class DivergedError(SteerclearError):
     """The network's numbers are no longer finite."""
 
+    def __init__(self, remedy: str) -> None:
+        super().__init__(f"the loss is no longer finite; lower {remedy}, earlier work is kept")
 
-def training_of(config: Any, folder: Path, resume: bool) -> Any:
-    """What trains a config's algorithm, with ``run(notice)``, ``decisions`` and ``total``.
 
-    Raises:
-        ConfigError: a setting or checkpoint is unusable, or what begins anew is to be resumed.
-    """
+def training_of(config: Config, folder: Path, resume: bool) -> Any:
+    """What trains a config's algorithm, with ``run(notice)``, ``decisions`` and ``total``."""
+    if resume and config.algorithm in ("qmix", "raids"):
+        raise ConfigError(f"{config.algorithm} begins anew; leave out --resume")
     module, name = MADE_BY[config.algorithm]
     return getattr(import_module(f".{module}", __package__), name)(config, folder, resume)
 
@@ -52,6 +57,7 @@ class Training:
     Args:
         config: what it is to be.
         folder: where everything goes.
+        resume: go on from the folder's last checkpoint, where the algorithm keeps any.
 
     Attributes:
         curve: one row per rollout.
@@ -59,10 +65,10 @@ class Training:
         total: decisions until the end.
     """
 
-    def __init__(self, config: Any, folder: Path) -> None:
+    def __init__(self, config: Config, folder: Path, resume: bool = False) -> None:
         self.config, self.folder = config, folder
         self.curve: list[dict[str, Any]] = []
-        self.decisions, self.total = 0, int(getattr(config, "decisions", 0))
+        self.decisions, self.total = 0, config.decisions
         self.best = -np.inf
 
     def network(self) -> Network:
@@ -71,9 +77,13 @@ class Training:
 
     def evaluate(self) -> dict[str, Any]:
         """Games against held-out opponents, and the best kept; the weights as they are lie there before the first."""
-        network = self.network()
+        network, asked = self.network(), self.config.evaluation
         write_weights(network, self.folder / FINAL)
-        found = evaluation_of(self.config, network)
+        shielded = self.config.shield != "none"
+        found = {
+            name: summary_of(play_games(self.config, network, name, asked.games, asked.seed, shielded))
+            for name in asked.opponents
+        }
         mean = float(np.mean([one["net"] for one in found.values()]))
         if mean > self.best:
             self.best = mean
@@ -87,18 +97,9 @@ class Training:
             write_weights(self.network(), self.folder / BEST)
 
     def write_curve(self, rows: Sequence[dict[str, Any]]) -> None:
-        """Write rows as the curve: JSON always, Parquet where pyarrow is there, TensorBoard where that is.
-
-        Raises:
-            ConfigError: it cannot be written.
-        """
-        content = {
-            "command": "train",
-            "settings": told_settings(self.config.model_dump(mode="json")),
-            "rows": list(rows),
-            "versions": versions(),
-            "machine": machine(),
-        }
+        """Write rows as the curve: JSON always, Parquet where pyarrow is there, TensorBoard where that is."""
+        settings = told_settings(self.config.told())
+        content = {"command": "train", "settings": settings, "rows": rows, "versions": versions(), "machine": machine()}
         with whole_file(self.folder / CURVE, ConfigError) as part:
             part.write_text(json.dumps(content, indent=1), encoding="utf-8")
         if find_spec("pyarrow") is not None and rows:
@@ -134,7 +135,7 @@ def means(games: Sequence[dict[str, float]], names: Sequence[str]) -> dict[str, 
     return {"games": len(games), **found}
 
 
-def card_of(config: Any) -> dict[str, Any]:
+def card_of(config: Config) -> dict[str, Any]:
     """Where the networks of a training come from, for people."""
     return {
         "trained_with": "steerclear train",
@@ -147,11 +148,7 @@ def card_of(config: Any) -> dict[str, Any]:
 
 
 def device_of(name: str) -> str:
-    """The device of a config's word.
-
-    Raises:
-        ConfigError: it is not there.
-    """
+    """The device of a config's word."""
     import torch
 
     there = torch.cuda.is_available()
@@ -171,3 +168,50 @@ def threads(count: int) -> Iterator[None]:
         yield
     finally:
         torch.set_num_threads(before)
+
+
+def play_games(
+    config: Config, own: Network, opponent: str, games: int, seed: int, shielded: bool
+) -> list[dict[str, float]]:
+    """Games of a network, many at once, as blue: a row each.
+
+    Args:
+        config: whose rules are played.
+        own: the network.
+        opponent: name of the opponent.
+        games: how many.
+        seed: of starts and policies.
+        shielded: the team has the config's shield.
+
+    Returns:
+        Captures for less against (``net``) and the counts of `EVENTS`, hits and interventions over the whole team.
+    """
+    core = core_of(config, games, seed)
+    core.reset(seed=seed)
+    ours, foe = batch_of(own), opponent_of(opponent)
+    ours.reset(core, 0, seed)
+    foe.reset(core, 1, seed + 1)
+    shield = shield_of(config, core) if shielded else None
+    boats, others = np.flatnonzero(core.team == 0), np.flatnonzero(core.team == 1)
+    tallies, command_filter = Tallies(core, 0, boats), None if shield is None else shield.filter_for(0)
+    going, commands = np.ones(games, np.bool_), np.zeros((games, core.n_boats, 2))
+    while going.any():
+        commands[:, boats], commands[:, others] = ours.act(core, 0), foe.act(core, 1)
+        core.step(commands, command_filter)
+        tallies.count(going, changed_by(shield, boats, (games, len(boats))))
+        going &= ~(core.terminated | core.truncated)
+    counts = tallies.step.mean(axis=2)
+    counts[6:] = tallies.step[6:].sum(axis=2)
+    rows = [dict(zip(EVENTS, column.tolist(), strict=True)) for column in counts.T]
+    return [{"net": row["captures"] - row["captures_against"], **row} for row in rows]
+
+
+def summary_of(rows: Sequence[Mapping[str, float]]) -> dict[str, Any]:
+    """Means per game, and the 95 % interval of the net captures."""
+    if not rows:
+        return {"games": 0}
+    found: dict[str, Any] = {name: float(np.mean([row[name] for row in rows])) for name in ("net", *EVENTS)}
+    interval = mean_interval([row["net"] for row in rows])
+    for name, limit in (("net_low", interval.low), ("net_high", interval.high)):
+        found[name] = limit if np.isfinite(limit) else None  # none where all games ended alike
+    return {"games": len(rows), **found}

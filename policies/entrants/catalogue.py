@@ -1,4 +1,4 @@
-"""The competition's entrants by name: a decorator enters a team."""
+"""The competition's entrants by name: a decorator enters a team, of ours or of another package."""
 
 from __future__ import annotations
 
@@ -10,8 +10,11 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from steerclear.shield.exceptions import PolicyError
+from steerclear.shield.foreign import load_others
 
 Build = TypeVar("Build", bound=Callable[..., Any])
+GROUP = "steerclear.entrants"
+"""Entry points of this group name modules that hold ``@entrant`` classes."""
 
 
 @dataclass(frozen=True)
@@ -34,9 +37,7 @@ class Entrant:
 
     def files(self) -> str:
         """Digest of the file that holds it; empty for ours, which the digest of the code covers."""
-        if self.build.__module__.startswith("steerclear."):
-            return ""
-        source = inspect.getsourcefile(self.build)
+        source = None if self.build.__module__.startswith("steerclear.") else inspect.getsourcefile(self.build)
         return "" if source is None else hashlib.sha256(Path(source).read_bytes()).hexdigest()[:16]
 
 
@@ -75,6 +76,7 @@ def entrant(
     return enter
 
 
-def entered() -> dict[str, Entrant]:
-    """Those entered so far."""
+def entrants() -> dict[str, Entrant]:
+    """All entrants, ours first, then those of other packages."""
+    load_others(GROUP)
     return dict(_ENTRANTS)

@@ -8,20 +8,20 @@ from typing import Any
 from steerclear.shield.exceptions import PolicyError
 
 from ..keyboard import Keys, window_keys
-from .options import OPTIONS, Choice, next_option
+from .options import OPTIONS, Choice, OptionPlayer
 from .plane import Order
-from .play import EntrantTeam
-from .sight import Boat, Sight
+from .sight import Sight
 
 BOAT_KEYS = ("q", "w", "e", "r", "t", "y")
 OPTION_KEYS = {str(number): name for number, name in enumerate(OPTIONS, start=1)}
 KEPT_S = 1.0
 """A row per boat is kept this often, s, and at once where a person chooses."""
+SHOWN = ("x", "y", "heading", "speed", "tagged", "carries", "on_side", "recharged")
 Say = Callable[[str], None]
 Row = dict[str, Any]
 
 
-class Demonstrator(EntrantTeam):
+class Demonstrator(OptionPlayer):
     """Plays the options a person chooses.
 
     Args:
@@ -40,11 +40,7 @@ class Demonstrator(EntrantTeam):
         self.rows: list[Row] = []
 
     def reset(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:
-        """Begin a game.
-
-        Raises:
-            PolicyError: no window and no keys, more boats than keys, or see `EntrantTeam.reset`.
-        """
+        """Begin a game."""
         self._keys = self._given_keys or window_keys(env)
         if len(agent_ids) > len(BOAT_KEYS):
             raise PolicyError(f"a person chooses for at most {len(BOAT_KEYS)} boats; the team has {len(agent_ids)}")
@@ -52,19 +48,20 @@ class Demonstrator(EntrantTeam):
 
     def begin(self, sight: Sight) -> None:
         """The first boat is chosen for; all boats guard."""
-        self._boat, self._held, self._next_s = 0, set[str](), sight.time
-        self._choices = [Choice("guard", sight.time) for _ in sight.own]
+        super().begin(sight)
+        self._boat, self._held = 0, set[str]()
 
     def decide(self, sight: Sight) -> list[Order]:
         """Take what the person chose, end what is over, follow the rest."""
-        chosen = self._read_keys(sight)
-        for number, choice in enumerate(self._choices):
-            if choice.ended(sight, number):
-                self._choices[number] = Choice(next_option(sight, number, "guard"), sight.time)
+        chosen, orders = self._read_keys(sight), self.follow(sight)
         if chosen is not None or sight.time >= self._next_s:
             self._next_s = sight.time + KEPT_S
             self.rows += [row_of(sight, k, choice, k == chosen) for k, choice in enumerate(self._choices)]
-        return [OPTIONS[choice.option].steer(sight, number) for number, choice in enumerate(self._choices)]
+        return orders
+
+    def wish(self, sight: Sight, number: int) -> str:
+        """The option that was chosen."""
+        return self._choices[number].option
 
     def _read_keys(self, sight: Sight) -> int | None:
         """The boat for which an option was just chosen, None when none was. A key counts when it goes down."""
@@ -95,15 +92,8 @@ def row_of(sight: Sight, number: int, choice: Choice, chosen: bool) -> Row:
         boat itself, ``mate{k}_*`` and ``foe{k}_*`` of the others, ``goal_x``, ``goal_y`` m, ``flag_taken``.
     """
     mates = [boat for k, boat in enumerate(sight.own) if k != number]
+    boats = {"own": sight.own[number], **{f"mate{k}": mate for k, mate in enumerate(mates)}}
+    boats |= {f"foe{k}": foe for k, foe in enumerate(sight.foes)}
     row: Row = {"time_s": sight.time, "boat": number, "option": choice.option, "since_s": choice.since_s}
-    row |= {"chosen": chosen, **_boat("own", sight.own[number])}
-    for k, mate in enumerate(mates):
-        row |= _boat(f"mate{k}", mate)
-    for k, foe in enumerate(sight.foes):
-        row |= _boat(f"foe{k}", foe)
+    row |= {"chosen": chosen, **{f"{who}_{name}": getattr(boat, name) for who, boat in boats.items() for name in SHOWN}}
     return row | {"goal_x": sight.goal[0], "goal_y": sight.goal[1], "flag_taken": sight.taken}
-
-
-def _boat(who: str, boat: Boat) -> Row:
-    names = ("x", "y", "heading", "speed", "tagged", "carries", "on_side", "recharged")
-    return {f"{who}_{name}": getattr(boat, name) for name in names}

@@ -8,21 +8,23 @@ with is its own affair; `OptionsTeam` plays given ones, and a person chooses in 
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from steerclear.shield.exceptions import PolicyError
 
 from .catalogue import entrant
-from .plane import STOP_MPS, Order, ahead, clip, distance, dock, go, heading_to, meeting_point
+from .plane import STOP_MPS, Order, ahead, arc, clip, distance, dock, go, heading_to, meeting_point
 from .play import EntrantTeam
-from .posts import arc
 from .sight import Boat, Sight
 
 Test = Callable[[Sight, int], bool]
 Steer = Callable[[Sight, int], Order]
 LONGEST_S = 30.0
 """An option that has not ended by then is ended, s."""
+EVERY_S = 1.0
+"""Time between looks, s."""
 AVOID_M = 16.0
 EDGE_M = 4.0
 
@@ -31,7 +33,6 @@ EDGE_M = 4.0
 class Option:
     """A primitive. ``begins`` and ``ends`` look at a sight and an own boat's number; ``steer`` gives its order."""
 
-    name: str
     begins: Test
     ends: Test
     steer: Steer
@@ -83,11 +84,6 @@ def tag(sight: Sight, number: int) -> Order:
     return go(boat, (min(x, sight.line - 1.0), clip(y, 1.0, sight.size[1] - 1.0)))
 
 
-def no_op(sight: Sight, number: int) -> Order:
-    """Stay."""
-    return STOP_MPS, sight.own[number].heading
-
-
 def nearest_foe(sight: Sight, number: int) -> Boat:
     """The nearest boat of the other team."""
     return min(sight.foes, key=lambda foe: distance(foe.at, sight.own[number].at))
@@ -103,16 +99,8 @@ def _free(sight: Sight, number: int) -> bool:
     return not sight.own[number].tagged
 
 
-def _carries(sight: Sight, number: int) -> bool:
-    return sight.own[number].carries
-
-
 def _seeks_flag(sight: Sight, number: int) -> bool:
     return _free(sight, number) and not any(boat.carries for boat in sight.own)
-
-
-def _seeking_ends(sight: Sight, number: int) -> bool:
-    return not _seeks_flag(sight, number)
 
 
 def _pressed(sight: Sight, number: int) -> bool:
@@ -126,50 +114,39 @@ def _at_home(sight: Sight, number: int) -> bool:
 
 
 def _can_tag(sight: Sight, number: int) -> bool:
-    boat = sight.own[number]
-    return _free(sight, number) and boat.recharged and target(sight, number) is not None
+    return _free(sight, number) and sight.own[number].recharged and target(sight, number) is not None
 
 
-def _always(sight: Sight, number: int) -> bool:
-    return True
+def _while(begins: Test, steer: Steer) -> Option:
+    """An option that ends when it could not begin."""
+    return Option(begins, lambda sight, number: not begins(sight, number), steer)
 
 
 OPTIONS = {
-    option.name: option
-    for option in (
-        Option("attack", _seeks_flag, _seeking_ends, attack),
-        Option("flank", _seeks_flag, _seeking_ends, flank),
-        Option("avoid", _pressed, lambda sight, number: not _pressed(sight, number), avoid),
-        Option("retreat", _always, _at_home, retreat),
-        Option("guard", _free, lambda sight, number: not _free(sight, number), guard),
-        Option("tag", _can_tag, lambda sight, number: not _can_tag(sight, number), tag),
-        Option("no_op", _always, lambda sight, number: False, no_op),
-    )
+    "attack": _while(_seeks_flag, attack),
+    "flank": _while(_seeks_flag, flank),
+    "avoid": _while(_pressed, avoid),
+    "retreat": Option(lambda sight, number: True, _at_home, retreat),
+    "guard": _while(_free, guard),
+    "tag": _while(_can_tag, tag),
+    "no_op": _while(lambda sight, number: True, lambda sight, number: (STOP_MPS, sight.own[number].heading)),
 }
 """By name, in the order of the keys 1 to 7 of ``steerclear demonstrate``."""
 
 
 def check_option(name: str) -> str:
-    """Return the name.
-
-    Raises:
-        PolicyError: no such option.
-    """
+    """Return the name."""
     if name not in OPTIONS:
         raise PolicyError(f"unknown option {name!r}; choose from {', '.join(OPTIONS)}")
     return name
 
 
+@dataclass(frozen=True)
 class Choice:
-    """The option one boat follows, since when, and what follows when it ends.
+    """The option one boat follows, and the game time at which it was chosen, s."""
 
-    Args:
-        option: its name.
-        since_s: game time at which it was chosen, s.
-    """
-
-    def __init__(self, option: str, since_s: float) -> None:
-        self.option, self.since_s = check_option(option), since_s
+    option: str
+    since_s: float
 
     def ended(self, sight: Sight, number: int) -> bool:
         """Whether it is over: by its own test, or after `LONGEST_S`."""
@@ -178,12 +155,43 @@ class Choice:
 
 def next_option(sight: Sight, number: int, wish: str) -> str:
     """What a boat does that wishes for an option: that if it may begin, home with a flag, else guard or nothing."""
-    if _carries(sight, number):
+    if sight.own[number].carries:
         return "retreat"
-    for name in (wish, "guard"):
-        if OPTIONS[name].begins(sight, number):
-            return name
-    return "no_op"
+    return next((name for name in (wish, "guard") if OPTIONS[name].begins(sight, number)), "no_op")
+
+
+class OptionPlayer(EntrantTeam):
+    """Chooses an option for each boat once a second; subclasses say which in `wish`."""
+
+    def begin(self, sight: Sight) -> None:
+        """All guard, until the first look."""
+        self._next_s = sight.time
+        self._choices = [Choice("guard", sight.time) for _ in sight.own]
+
+    def decide(self, sight: Sight) -> list[Order]:
+        """Choose where it is time, end what is over, follow."""
+        if sight.time >= self._next_s - 1e-9:
+            self._next_s = sight.time + EVERY_S
+            self.look_round(sight)
+        return self.follow(sight)
+
+    def follow(self, sight: Sight) -> list[Order]:
+        """What the options order; where one is over the boat guards."""
+        for number, choice in enumerate(self._choices):
+            if choice.ended(sight, number):
+                self._choices[number] = Choice(next_option(sight, number, "guard"), sight.time)
+        return [OPTIONS[choice.option].steer(sight, number) for number, choice in enumerate(self._choices)]
+
+    def look_round(self, sight: Sight) -> None:
+        """Choose for every boat."""
+        for number, choice in enumerate(self._choices):
+            name = next_option(sight, number, self.wish(sight, number))
+            if name != choice.option:
+                self._choices[number] = Choice(name, sight.time)
+
+    @abstractmethod
+    def wish(self, sight: Sight, number: int) -> str:
+        """The option a boat wishes for."""
 
 
 @entrant("options", "one of Crowley-BU-LL's primitives per boat (boats='attack,flank,guard')")
@@ -205,11 +213,7 @@ class OptionsTeam(EntrantTeam):
         self._given = [check_option(str(word).strip()) for word in words]
 
     def begin(self, sight: Sight) -> None:
-        """Hand out the options.
-
-        Raises:
-            PolicyError: neither one nor one per boat.
-        """
+        """Hand out the options."""
         if len(self._given) not in (1, len(sight.own)):
             raise PolicyError(
                 f"boats names {len(self._given)} options for {len(sight.own)} boats; give one or one each"

@@ -6,14 +6,21 @@ import numpy as np
 from steerclear.env.core import BatchedMctf
 from steerclear.env.field import CORNER_INSET_M
 from steerclear.shield.exceptions import PolicyError
-from steerclear.shield.jit import Array, BoolArray, IntArray
+from steerclear.shield.jit import Array, BoolArray, IntArray, lean_kernel
 
 from . import layout as S
-from .dispatch import command_batch
-from .geometry import seed_streams
+from .boats import easy_defend, ram, random_walk, waypoints
+from .layout import MEDIUM_REACH, Behaviour, Game, seed_streams
 from .plan import Plan
+from .roles import HARD_REACH_M, easy_attack, field_attack, hard, hard_defend, medium_defend
 
 _SEED_MASK = (1 << 64) - 1
+# plain integers: the kernels' constants must be types numba caches
+RANDOM, RAMMER, WAYPOINTS = int(Behaviour.RANDOM), int(Behaviour.RAMMER), int(Behaviour.WAYPOINTS)
+EASY_ATTACK, EASY_DEFEND = int(Behaviour.EASY_ATTACK), int(Behaviour.EASY_DEFEND)
+MEDIUM_ATTACK, MEDIUM_DEFEND = int(Behaviour.MEDIUM_ATTACK), int(Behaviour.MEDIUM_DEFEND)
+HARD, HARD_ATTACK = int(Behaviour.HARD), int(Behaviour.HARD_ATTACK)
+HARD_DEFEND = int(Behaviour.HARD_DEFEND)
 
 
 class ScriptedBatch:
@@ -37,9 +44,6 @@ class ScriptedBatch:
             team: 0 blue, 1 red.
             seed: game b draws from seed + b; also chooses the hidden opponent's composition.
             boats: numbers of the boats to play; None for the whole team.
-
-        Raises:
-            PolicyError: no such team, an unusable seed, or the plan does not fit the team's size.
         """
         if team not in (0, 1):
             raise PolicyError(f"team is {team!r}; give 0 (blue) or 1 (red)")
@@ -59,11 +63,7 @@ class ScriptedBatch:
         self.restart(np.ones(core.n_games, dtype=np.bool_), seed)
 
     def restart(self, chosen: BoolArray, seed: int) -> None:
-        """Begin the chosen games (B,) anew, game b with seed + b; the others go on.
-
-        Raises:
-            PolicyError: an unusable seed, or the plan does not fit the team's size.
-        """
+        """Begin the chosen games (B,) anew, game b with seed + b; the others go on."""
         if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)):
             raise PolicyError(f"seed is {seed!r}; give a whole number")
         self._memory[chosen] = 0.0
@@ -74,14 +74,10 @@ class ScriptedBatch:
         seed_streams(seeds, self._boats, chosen, self._streams)
 
     def act(self, core: BatchedMctf, team: int) -> Array:
-        """Commands (B, n_team, 2), speed m/s and relative heading deg; the array is reused by the next call.
-
-        Raises:
-            PolicyError: `reset` was not called for this team and number of games.
-        """
+        """Commands (B, n_team, 2), speed m/s and relative heading deg; the array is reused by the next call."""
         if team != self._team or core.n_games != self._out.shape[0]:
             raise PolicyError(f"policy {self.name!r} was not reset for team {team} of these games; call reset first")
-        games = S.Game(
+        games = Game(
             core.state,
             self._limits,
             core.team,
@@ -96,9 +92,9 @@ class ScriptedBatch:
         return self._out
 
     @property
-    def behaviours(self) -> list[list[S.Behaviour]]:
+    def behaviours(self) -> list[list[Behaviour]]:
         """What each boat does, by game."""
-        return [[S.Behaviour(code) for code in row] for row in self._codes]
+        return [[Behaviour(code) for code in row] for row in self._codes]
 
     @property
     def waypoints_reached(self) -> IntArray:
@@ -127,3 +123,66 @@ def _given_points(plan: Plan, n_boats: int) -> Array:
             raise PolicyError(f"points are for {given} boats but the team has {n_boats}; give (k, 2) or one list each")
         return plan.points
     return np.stack([np.roll(plan.points, -slot, axis=0) for slot in range(n_boats)])
+
+
+@lean_kernel
+def command_boat(
+    game: Game, boat: int, behaviour: int, memory: Array, given: Array, streams: np.ndarray, slot: int
+) -> tuple[float, float]:
+    """Speed m/s and relative heading deg of one boat under its behaviour; advances its memory and stream."""
+    if behaviour == MEDIUM_ATTACK:
+        return field_attack(game, boat, game.field[MEDIUM_REACH], False)
+    if behaviour == MEDIUM_DEFEND:
+        return medium_defend(game, boat)
+    if behaviour == EASY_ATTACK:
+        return easy_attack(game, boat, memory)
+    if behaviour == EASY_DEFEND:
+        return easy_defend(game, boat, memory)
+    if behaviour == HARD:
+        return hard(game, boat)
+    if behaviour == HARD_ATTACK:
+        return field_attack(game, boat, HARD_REACH_M, True)
+    if behaviour == HARD_DEFEND:
+        return hard_defend(game, boat)
+    if behaviour == RAMMER:
+        return ram(game, boat)
+    if behaviour == WAYPOINTS:
+        return waypoints(game, boat, memory, given, streams, slot)
+    if behaviour == RANDOM:
+        return random_walk(game, boat, memory, streams, slot)
+    return 0.0, 0.0
+
+
+@lean_kernel
+def command_team(
+    codes: IntArray, boats: IntArray, memory: Array, given: Array, streams: np.ndarray, game: Game, out: Array
+) -> None:
+    """Commands of the boats of one team in one game, into ``out`` (n_team, 2): speed m/s, relative heading deg."""
+    for slot in range(boats.size):
+        speed, heading = command_boat(game, boats[slot], codes[slot], memory[slot], given[slot], streams, slot)
+        out[slot, 0] = speed
+        out[slot, 1] = heading
+
+
+@lean_kernel
+def command_batch(
+    codes: IntArray, boats: IntArray, memory: Array, given: Array, streams: np.ndarray, games: Game, out: Array
+) -> None:
+    """``command_team`` for every game: the same arguments, with a leading axis of games.
+
+    ``boats`` and ``given`` are the same in all games and have none, nor have ``limits``, ``team``, ``flag_home`` and
+    ``field`` of the games.
+    """
+    for g in range(games.state.shape[0]):
+        game = Game(
+            games.state[g],
+            games.limits,
+            games.team,
+            games.is_tagged[g],
+            games.has_flag[g],
+            games.on_side[g],
+            games.flag_home,
+            games.flag_position[g],
+            games.field,
+        )
+        command_team(codes[g], boats, memory[g], given, streams[g], game, out[g])

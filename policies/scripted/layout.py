@@ -1,11 +1,19 @@
-"""What the scripted policies' compiled code reads and remembers: column numbers and behaviour codes."""
+"""What the scripted policies' compiled code reads and remembers, and its plane geometry.
+
+A team's own-end frame is the field as a team sees it whose flag is on the left (blue, as a rule); for a team whose flag
+is on the right it is the field turned by 180 deg. A boat's frame is (right, forward).
+"""
 
 from __future__ import annotations
 
+import math
 from enum import IntEnum
 from typing import NamedTuple
 
-from steerclear.shield.jit import Array, BoolArray, IntArray
+import numpy as np
+from steerclear.env.randomness import GAMMA, MIX_1, mix
+from steerclear.shield.jit import Array, BoolArray, IntArray, lean_kernel
+from steerclear.shield.platforms import layout as L
 
 
 class Behaviour(IntEnum):
@@ -24,48 +32,18 @@ class Behaviour(IntEnum):
     HARD = 10
 
 
-# --- columns of a boat's memory row ----------------------------------------------------------------
-GOAL = 0
-"""Number of the path point or given waypoint the boat is heading for."""
-GOAL_X = 1
-"""Waypoint east, m."""
-GOAL_Y = 2
-"""Waypoint north, m."""
-TIME_LEFT = 3
-"""Time until the boat draws again, s; 0 before the first draw."""
-HELD_SPEED = 4
-"""Speed held by the random walk, m/s."""
-HELD_HEADING = 5
-"""Absolute heading held by the random walk, deg."""
-REACHED = 6
-"""Waypoints reached so far."""
-N_MEMORY = 7
-
-# --- columns of the field row ----------------------------------------------------------------------
-WIDTH = 0
-"""Field along x, m."""
-HEIGHT = 1
-"""Field along y, m."""
-KEEPOUT = 2
-"""Radius around the own flag that its own boats may not enter, without the boat's radius, m."""
-STEP = 3
-"""Time between two decisions, s."""
-SPEED_FRACTION = 4
-"""Share of its top speed a rammer or waypoint boat asks for."""
-HIT_TEAM_MATES = 5
-"""1 when a rammer also aims at boats of its own team."""
-MEDIUM_REACH = 6
-"""Distance within which opponents push a medium attacker off, m."""
-CORNER_INSET = 7
-"""How far inside its own side's corners, along both edges, a team brings the flag to, m; 0: not to corners."""
+GOAL, GOAL_X, GOAL_Y, TIME_LEFT, HELD_SPEED, HELD_HEADING, REACHED, N_MEMORY = 0, 1, 2, 3, 4, 5, 6, 7
+"""Columns of a boat's memory: number of the path point or given waypoint it is heading for, waypoint east and north, m,
+time until it draws again, s (0 before the first draw), speed, m/s, and absolute heading, deg, held by the random walk,
+waypoints reached so far."""
+WIDTH, HEIGHT, KEEPOUT, STEP, SPEED_FRACTION, HIT_TEAM_MATES, MEDIUM_REACH, CORNER_INSET = 0, 1, 2, 3, 4, 5, 6, 7
 N_FIELD = 8
-
-# --- columns of a boat's limits --------------------------------------------------------------------
-MAX_SPEED = 0
-"""Top speed, m/s."""
-RADIUS = 1
-"""Agent radius, m."""
-N_LIMIT = 2
+"""Columns of the field row: field along x and y, m, radius round the own flag that its own boats may not enter, without
+the boat's radius, m, time between two decisions, s, share of its top speed a rammer or waypoint boat asks for, 1 when a
+rammer also aims at boats of its own team, distance within which opponents push a medium attacker off, m, and how far
+inside its own side's corners, along both edges, a team brings the flag to, m (0: not to corners)."""
+MAX_SPEED, RADIUS, N_LIMIT = 0, 1, 2
+"""Columns of a boat's limits: top speed, m/s, and agent radius, m."""
 
 
 class Game(NamedTuple):
@@ -86,3 +64,73 @@ class Game(NamedTuple):
     """``(2, 2)`` m; a taken flag is where its carrier is."""
     field: Array
     """``(N_FIELD,)``."""
+
+
+@lean_kernel
+def to_boat(game: Game, boat: int, x_m: float, y_m: float) -> tuple[float, float]:
+    """Point of the field in the boat's frame: (right, forward), m."""
+    heading = math.radians(game.state[boat, L.HEADING])
+    east, north = x_m - game.state[boat, L.X], y_m - game.state[boat, L.Y]
+    sine, cosine = math.sin(heading), math.cos(heading)
+    return east * cosine - north * sine, east * sine + north * cosine
+
+
+@lean_kernel
+def boat_to_boat(game: Game, boat: int, other: int) -> tuple[float, float]:
+    """Another boat in the boat's frame: (right, forward), m."""
+    return to_boat(game, boat, game.state[other, L.X], game.state[other, L.Y])
+
+
+@lean_kernel
+def unit(right: float, forward: float) -> tuple[float, float]:
+    """The vector scaled to length 1; a zero vector stays zero."""
+    length = math.hypot(right, forward)
+    if length == 0.0:
+        return 0.0, 0.0
+    return right / length, forward / length
+
+
+@lean_kernel
+def bearing_deg(right: float, forward: float) -> float:
+    """Relative bearing of a vector in the boat's frame, deg clockwise, in (-180, 180]."""
+    return math.degrees(math.atan2(right, forward))
+
+
+@lean_kernel
+def is_turned(game: Game, team: int) -> bool:
+    """Whether the team's flag is on the right, so that its own-end frame is the field turned by 180 deg."""
+    return game.flag_home[team, 0] > 0.5 * game.field[WIDTH]
+
+
+@lean_kernel
+def own_end_point(game: Game, team: int, along: float, across: float) -> tuple[float, float]:
+    """Point given as fractions of the field in the team's own-end frame, m in the field's frame."""
+    if is_turned(game, team):
+        along, across = 1.0 - along, 1.0 - across
+    return along * game.field[WIDTH], across * game.field[HEIGHT]
+
+
+@lean_kernel
+def place_of_capture(game: Game, boat: int) -> tuple[float, float]:
+    """Where a boat brings the flag to, m: its own flag's home, or the nearer of its side's corner marks."""
+    team, inset_m = game.team[boat], game.field[CORNER_INSET]
+    if inset_m == 0.0:
+        return game.flag_home[team, 0], game.flag_home[team, 1]
+    x = game.field[WIDTH] - inset_m if is_turned(game, team) else inset_m
+    lower = game.state[boat, L.Y] < 0.5 * game.field[HEIGHT]
+    return x, inset_m if lower else game.field[HEIGHT] - inset_m
+
+
+@lean_kernel
+def wrap_deg(angle: float) -> float:
+    """The same angle in [-180, 180)."""
+    return (angle + 180.0) % 360.0 - 180.0
+
+
+@lean_kernel
+def seed_streams(seeds: np.ndarray, boats: np.ndarray, chosen: np.ndarray, streams: np.ndarray) -> None:
+    """Start one independent stream per boat in the chosen games, in place."""
+    for g in range(seeds.size):
+        for slot in range(boats.size):
+            if chosen[g]:
+                streams[g, slot] = mix(mix(seeds[g] + GAMMA) ^ (np.uint64(boats[slot] + 1) * MIX_1))

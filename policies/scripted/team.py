@@ -8,55 +8,59 @@ from typing import Any
 import numpy as np
 from steerclear.env.core import BatchedMctf
 from steerclear.shield.exceptions import PolicyError
-from steerclear.shield.jit import IntArray
+from steerclear.shield.jit import Array, IntArray
 
 from .batch import ScriptedBatch
 from .layout import Behaviour
 from .plan import Plan
 
 
-class ScriptedTeam:
-    """A scripted team in one game: a thin front over `ScriptedBatch`, so that one game plays as one of a batch.
-
-    Reads the live game, not the observations.
+class BatchTeam:
+    """A batch policy that plays some boats of a team in one game, so that one game plays as one of a batch.
 
     Args:
-        name: name for records and reports.
-        plan: who does what.
+        batch: the policy, whose ``reset`` takes the numbers of the boats.
     """
 
-    def __init__(self, name: str, plan: Plan) -> None:
-        self.name = name
-        self._batch = ScriptedBatch(name, plan)
+    def __init__(self, batch: Any) -> None:
+        self.name, self._batch = batch.name, batch
         self._ids: list[str] = []
 
     def reset(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:
         """Begin a game.
 
-        Args:
-            env: the `MctfEnv`, or a wrapper round one.
-            agent_ids: boats of one team.
-            seed: seed of random play; chooses the hidden opponent's composition.
-
         Raises:
-            PolicyError: not such an env, unknown boats, boats of both teams, or roles that do not fit the team.
+            PolicyError: not an `MctfEnv` (or a wrapper round one), unknown boats, boats of both teams, or a game that
+                the batch policy does not play.
         """
         self._core = game_core(env)
         self._ids = list(agent_ids)
-        boats = boat_numbers(self._core, self._ids)
-        self._team = int(self._core.team[boats[0]])
-        self._batch.reset(self._core, self._team, seed, boats)
+        self._boats = boat_numbers(self._core, self._ids)
+        self._team = int(self._core.team[self._boats[0]])
+        self._batch.reset(self._core, self._team, seed, self._boats)
 
     def act(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
-        """Actions (speed m/s, relative heading deg) of the boats; the arguments are not read.
+        """Actions (speed m/s, relative heading deg) of the boats; `infos` are not read.
 
         Raises:
             PolicyError: `reset` was not called.
         """
         if not self._ids:
             raise PolicyError(f"policy {self.name!r} has no game; call reset(env, agent_ids, seed) first")
-        rows = self._batch.act(self._core, self._team)[0].tolist()
+        rows = self._rows(observations).tolist()
         return {agent_id: (row[0], row[1]) for agent_id, row in zip(self._ids, rows, strict=True)}
+
+    def _rows(self, observations: Mapping[str, np.ndarray]) -> Array:
+        """Commands (n, 2): of the live game, the observations are not read."""
+        found: Array = self._batch.act(self._core, self._team)[0]
+        return found
+
+
+class ScriptedTeam(BatchTeam):
+    """A scripted team in one game: a front over `ScriptedBatch`, whose arguments it takes."""
+
+    def __init__(self, name: str, plan: Plan) -> None:
+        super().__init__(ScriptedBatch(name, plan))
 
     @property
     def behaviours(self) -> dict[str, Behaviour]:
@@ -70,11 +74,7 @@ class ScriptedTeam:
 
 
 def game_core(env: Any) -> BatchedMctf:
-    """The game behind an `MctfEnv` or a wrapper round one.
-
-    Raises:
-        PolicyError: there is none.
-    """
+    """The game behind an `MctfEnv` or a wrapper round one."""
     core = getattr(getattr(env, "unwrapped", env), "core", None)
     if not isinstance(core, BatchedMctf) or core.n_games != 1:
         raise PolicyError(f"scripted policies need an MctfEnv, not {type(env).__name__}; use make_batch for batches")
@@ -82,11 +82,7 @@ def game_core(env: Any) -> BatchedMctf:
 
 
 def boat_numbers(core: BatchedMctf, agent_ids: Sequence[str]) -> IntArray:
-    """Numbers of boats of one team.
-
-    Raises:
-        PolicyError: none, unknown or repeated boats, or boats of both teams.
-    """
+    """Numbers of boats of one team."""
     known = core.config.agent_ids
     unknown = [agent_id for agent_id in agent_ids if agent_id not in known]
     if unknown or not agent_ids or len(set(agent_ids)) != len(agent_ids):

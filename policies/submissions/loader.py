@@ -1,24 +1,26 @@
-"""Loads a competition submission and plays it unchanged."""
+"""Loads a competition submission and plays it unchanged, with the past observations that it asks for."""
 
 from __future__ import annotations
 
 import contextlib
+import inspect
 import logging
 import os
 import random
 import sys
+from collections import deque
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.foreign import describe_error, plain_text
 
-from ..games import SeenGame, seen_game
+from ..actions import SeenGame, seen_game
+from ..adapters import call_fault
 from ..guard import Answer, ForeignCode, GameFacts, GuardedTeam
-from .history import CONFIG_FILE, History, ObservationSettings
-from .interface import METHOD_NAME, check_interface
 from .made_for import MadeFor, check_game, made_for, words_of_less
 from .sandbox import Sandbox
 from .stage import ENTRY_FILE, MAX_BYTES, Stage
@@ -26,7 +28,10 @@ from .stage import ENTRY_FILE, MAX_BYTES, Stage
 logger = logging.getLogger(__name__)
 ALONE = "STEERCLEAR_ENTRY_ALONE"
 """Environment variable of processes that run one submission only: what it sets there concerns nobody else."""
-CLASS_NAME = "solution"
+CONFIG_FILE, CLASS_NAME, METHOD_NAME = "gen_config.py", "solution", "compute_action"
+ARGUMENTS = ("agent_id", "full_obs_normalized", "full_obs", "global_state")
+ARGUMENTS_OF_2024 = 3
+"""(agent_id as a number, observation_normalized, observation), both of that boat alone."""
 FAILURE_NAME = "steerclear_failure"
 """Method of a shielded zip's class: what went wrong inside for a boat that its shield answered for."""
 
@@ -51,6 +56,82 @@ class GlobalState(dict[Any, Any]):
         return self if key in self._ids else super().get(key, default)
 
 
+class History:
+    """Past observations of all boats. Before the game is old enough, its first observation stands in.
+
+    Args:
+        ages: which ones are asked for, in steps, newest (0) first; (0,) for the present only.
+    """
+
+    def __init__(self, ages: tuple[int, ...]) -> None:
+        self._ages = ages
+        self._past: deque[tuple[dict[str, Any], dict[str, Any]]] = deque(maxlen=ages[-1] + 1)
+
+    def clear(self) -> None:
+        """A new game begins."""
+        self._past.clear()
+
+    def push(self, normalized: dict[str, Any], raw: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Take in the present step's observations by agent and answer those the submission is to see.
+
+        Returns:
+            Both dicts as given when no history is asked for; else per agent an array (k, n_obs) and an array (k,) of
+            dicts, newest first.
+        """
+        if self._ages == (0,):
+            return normalized, raw
+        if not self._past:
+            self._past.extend([(normalized, raw)] * (self._ages[-1] + 1))
+        self._past.appendleft((normalized, raw))
+        chosen = [self._past[age] for age in self._ages]
+        stacked = {agent_id: np.stack([step[0][agent_id] for step in chosen]) for agent_id in normalized}
+        dicts = {agent_id: np.empty(len(chosen), dtype=object) for agent_id in raw}
+        for agent_id, array in dicts.items():
+            array[:] = [step[1][agent_id] for step in chosen]
+        return stacked, dicts
+
+
+def ages_of(module: ModuleType) -> tuple[int, ...]:
+    """Ages of the observations that a loaded ``gen_config.py`` asks for; all else in it is the game's affair."""
+    found = {
+        name: value
+        for name, value in vars(module).items()
+        if isinstance(value, Mapping) and ("short_obs_hist_length" in value or "lidar_obs" in value)
+    }
+    names = sorted(found, key=lambda name: "competition" not in name)  # the competition's, should there be several
+    config = found[names[0]] if names else {}
+    if config.get("lidar_obs", False):
+        raise PolicyError(f"{CONFIG_FILE} asks for lidar observations, which this game does not make")
+    ages: set[int] = set()
+    for kind in ("short", "long"):
+        length, interval = (_count(config, f"{kind}_obs_hist_{word}") for word in ("length", "interval"))
+        ages.update(range(0, length * interval, interval))
+    return tuple(sorted(ages))
+
+
+def _count(config: Mapping[str, Any], name: str) -> int:
+    value = config.get(name, 1)
+    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= 10_000:
+        raise PolicyError(f"{CONFIG_FILE}: {name} is {value!r}; it must be a whole number from 1")
+    return value
+
+
+def check_interface(instance: Any, source: object) -> None:
+    """Check that a ``solution`` can be asked for actions: one that cannot be called would hold all game."""
+    method = getattr(instance, METHOD_NAME, None)
+    if not callable(method):
+        raise PolicyError(f"solution() of {source} has no method {METHOD_NAME!r}; define one")
+    fault = call_fault(method, ARGUMENTS)
+    if fault is None:
+        return
+    remedy = f"define {METHOD_NAME}(self, {', '.join(ARGUMENTS)})"
+    with contextlib.suppress(Exception):  # foreign signatures may raise anything
+        inspect.signature(method).bind(*range(ARGUMENTS_OF_2024))
+        old = "it looks like the interface of 2024, whose observations this game does not make: port it, and "
+        remedy = f"{old}{remedy}"
+    raise PolicyError(f"{METHOD_NAME} of {source} {fault}; {remedy}, the last three being dicts keyed by agent id")
+
+
 class SubmissionCode(ForeignCode):
     """A ``solution`` object and the folder it lives in.
 
@@ -66,23 +147,19 @@ class SubmissionCode(ForeignCode):
         self.stage = Stage(source, max_bytes)
         self._sandbox = Sandbox(self.stage.folder, ALONE in os.environ)
         try:
-            self._class, settings = self._load()
+            self._class, ages = self._load()
             instance = self._build()
             with self._sandbox.active():
                 check_interface(instance, self.stage.source)
         except BaseException:
             self.close()
             raise
-        self._history = History(settings)
+        self._history = History(ages)
         self._made = made_for(self.stage.folder)
         self._told = ""
 
     def begin(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:
-        """A fresh instance for each game, built and run from the game's seed.
-
-        Raises:
-            PolicyError: it cannot be built, or the shield in it is for another game.
-        """
+        """A fresh instance for each game, built and run from the game's seed."""
         if self._made is not None and not isinstance(env, GameFacts):  # a runner of this process checked it
             self._check_game(self._made, seen_game(env))
         self._instance = self._build(seed)
@@ -124,17 +201,16 @@ class SubmissionCode(ForeignCode):
         """Remove the temporary folder."""
         self.stage.close()
 
-    def _load(self) -> tuple[type, ObservationSettings]:
+    def _load(self) -> tuple[type, tuple[int, ...]]:
         with self._sandbox.active():
-            settings = ObservationSettings()
-            if (self.stage.folder / CONFIG_FILE).is_file():
-                settings = ObservationSettings.from_module(self._run(CONFIG_FILE))
+            asked = (self.stage.folder / CONFIG_FILE).is_file()
+            ages = ages_of(self._run(CONFIG_FILE)) if asked else (0,)
             found = getattr(self._run(ENTRY_FILE), CLASS_NAME, None)
         if not isinstance(found, type):
             raise PolicyError(f"{ENTRY_FILE} of {self.stage.source} has no class {CLASS_NAME!r}; define one")
         if not callable(getattr(found, METHOD_NAME, None)):
             raise PolicyError(f"class {CLASS_NAME!r} of {self.stage.source} has no method {METHOD_NAME!r}; define one")
-        return found, settings
+        return found, ages
 
     def _run(self, file: str) -> Any:
         try:
@@ -168,15 +244,6 @@ def seed_libraries(seed: int) -> None:
 
 
 def load_submission(path: str | Path, name: str | None = None, max_bytes: int = MAX_BYTES) -> GuardedTeam:
-    """A competition submission as a team policy.
-
-    Args:
-        path: folder or zip with ``solution.py``, or that file.
-        name: name for records and reports; None takes the folder's or zip's.
-        max_bytes: largest unpacked size of a zip.
-
-    Raises:
-        PolicyError: it cannot be loaded or built; the message says why and where.
-    """
+    """A competition submission as a team policy."""
     code = SubmissionCode(path, max_bytes)
     return GuardedTeam(name or code.stage.source.stem, code)

@@ -16,7 +16,7 @@ from steerclear.shield.foreign import plain_text
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.renamed import current_settings
 
-from ..games import SeenGame
+from ..actions import SeenGame
 
 ABOUT_FILE = "steerclear_entry.json"
 """Lies beside ``solution.py``."""
@@ -68,11 +68,7 @@ def made_for(source: str | Path) -> MadeFor | None:
 
 
 def _content(source: Path) -> bytes:
-    """Bytes of the file, empty where there is none of its size, or where the entry is a pipe, which is not waited for.
-
-    Raises:
-        OSError, RuntimeError, EOFError, zipfile.BadZipFile, zlib.error: it cannot be read.
-    """
+    """Bytes of the file, empty where there is none of its size; a pipe is not waited for."""
     if source.is_dir() or source.suffix == ".py":
         path = (source if source.is_dir() else source.parent) / ABOUT_FILE
         return path.read_bytes() if path.is_file() and path.stat().st_size <= MAX_BYTES else b""
@@ -86,11 +82,7 @@ def _content(source: Path) -> bytes:
 
 
 def check_game(made: MadeFor, game: GameConfig | SeenGame, source: object) -> None:
-    """Refuse a game that the shield in an entry does not foresee: of another length of a decision, or other boats.
-
-    Raises:
-        PolicyError: it is one.
-    """
+    """Refuse a game that the shield in an entry does not foresee: of another length of a decision, or other boats."""
     if not made.shielded:
         return
     names, other = platform_names(game), ""

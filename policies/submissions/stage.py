@@ -73,11 +73,7 @@ class Stage:
 
 
 def find_entry(folder: Path, source: Path) -> Path:
-    """The folder that holds ``solution.py``: this one, or its only subfolder that has it.
-
-    Raises:
-        PolicyError: none or several; it names the source.
-    """
+    """The folder that holds ``solution.py``: this one, or its only subfolder that has it."""
     if (folder / ENTRY_FILE).is_file():
         return folder
     inside = sorted(path.parent for path in folder.glob(f"*/{ENTRY_FILE}") if path.is_file())
@@ -106,11 +102,7 @@ def link_folder(source: Path, top: Path) -> Path:
 
 
 def unpack(archive: Path, top: Path, max_bytes: int) -> None:
-    """Unpack a zip after checking every name, kind and size in it.
-
-    Raises:
-        PolicyError: not a zip, broken, encrypted, too large, or with a member that would land outside ``top``.
-    """
+    """Unpack a zip after checking every name, kind and size in it."""
     try:
         with zipfile.ZipFile(archive) as opened:
             members = opened.infolist()
@@ -123,11 +115,7 @@ def unpack(archive: Path, top: Path, max_bytes: int) -> None:
 
 
 def check_members(archive: Path, members: list[zipfile.ZipInfo], max_bytes: int) -> None:
-    """Refuse an archive that is too large or holds anything but plain files and folders inside it.
-
-    Raises:
-        PolicyError: which member, and why.
-    """
+    """Refuse an archive that is too large or holds anything but plain files and folders inside it."""
     if len(members) > MAX_FILES:
         raise PolicyError(f"{archive} has {len(members)} files, more than {MAX_FILES}; leave out what is not needed")
     total = sum(member.file_size for member in members)

@@ -11,7 +11,7 @@ from steerclear.experiments.cli import app
 from steerclear.experiments.cli_files import check_apart, check_files, check_json_file, written_by
 from steerclear.experiments.cli_games import ablate
 from steerclear.experiments.console import ExitCode
-from steerclear.policies.entrants.learned.entered import FILES
+from steerclear.policies.entrants.learned import FILES
 from steerclear.shield import ShieldConfig
 from steerclear.shield.exceptions import ConfigError
 from typer.testing import CliRunner

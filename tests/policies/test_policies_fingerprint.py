@@ -47,12 +47,6 @@ def test_a_file_that_cannot_be_read_is_said(entry):
         policies.fingerprint(entry)
 
 
-def test_a_renamed_file_gives_another_digest(entry):
-    before = policies.fingerprint(entry)
-    (entry / "weights" / "actor.pt").rename(entry / "weights" / "critic.pt")
-    assert policies.fingerprint(entry) != before
-
-
 def test_what_a_run_leaves_behind_does_not_count(entry):
     before = policies.fingerprint(entry)
     for place in (
@@ -66,6 +60,7 @@ def test_what_a_run_leaves_behind_does_not_count(entry):
     ):
         (entry / place).parent.mkdir(parents=True, exist_ok=True)
         (entry / place).write_text("new")
+    os.mkfifo(entry / "orders")  # reading it would never end
     assert policies.fingerprint(entry) == before
 
 
@@ -83,9 +78,3 @@ def test_of_an_archive_and_of_learned_weights_only_the_file_counts(tmp_path):
     assert policies.fingerprint(f"sb3:{model}") == policies.fingerprint(model) == first
     model.write_bytes(b"two")
     assert policies.fingerprint(model) != first
-
-
-def test_pipes_are_not_read(entry):
-    before = policies.fingerprint(entry)
-    os.mkfifo(entry / "orders")
-    assert policies.fingerprint(entry) == before

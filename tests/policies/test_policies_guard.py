@@ -1,16 +1,19 @@
+"""Foreign code plays boat by boat, whatever it does the game goes on, and what cannot be called is refused at load."""
+
 import logging
 import time
 
 import numpy as np
 import pytest
 from steerclear import policies
-from steerclear.env.mctf import MctfEnv
-from steerclear.policies.registry import KEYBOARD
+from steerclear.policies.adapters import call_fault
 from steerclear.shield.exceptions import PolicyError
-from steerclear.shield.foreign import describe_error
+
+OF_2024 = "self, agent_id:int, observation_normalized:list, observation:dict"
+OWN = ("agent_0", "agent_1", "agent_2")
 
 
-def run(team, game, steps=1, own=("agent_0", "agent_1", "agent_2")):
+def run(team, game, steps=1, own=OWN):
     """Actions of each step."""
     env, observations, infos = game
     team.reset(env, list(own), 0)
@@ -29,41 +32,35 @@ def test_a_function_gets_each_boats_observation_and_its_actions_pass_unchanged(g
         return np.array([1.0, 5.0])
 
     actions = run(policies.from_callable(answer), game)[0]
-    assert list(actions) == ["agent_0", "agent_1", "agent_2"]
+    assert tuple(actions) == OWN
     for observation, agent_id in zip(seen, actions, strict=True):
         np.testing.assert_array_equal(observation, game[1][agent_id])
         assert actions[agent_id].dtype == np.float64
-
-
-def test_functions_by_agent(game):
     team = policies.from_callable({f"agent_{k}": (lambda obs, k=k: k) for k in range(3)})
     assert run(team, game)[0] == {"agent_0": 0, "agent_1": 1, "agent_2": 2}
     with pytest.raises(PolicyError, match="no function for agent_3"):
         team.reset(game[0], ["agent_3"], 0)
 
 
+class Both:
+    """A function, and an agent."""
+
+    def __call__(self, obs):
+        return 4
+
+    def compute_action(self, obs, info):
+        return 4
+
+
 @pytest.mark.parametrize("wrap", [policies.from_callable, lambda f: policies.from_agents(lambda name, env: f)])
-def test_a_boat_that_is_not_observed_is_one_line(game, wrap):
-    class Both:
-        def __call__(self, obs):
-            return 4
-
-        def compute_action(self, obs, info):
-            return 4
-
+def test_a_boat_that_is_not_observed_and_a_game_that_was_not_begun_are_one_line(game, wrap):
     team = wrap(Both())
+    with pytest.raises(PolicyError, match="call reset"):
+        team.act({}, {})
     team.reset(game[0], ["agent_0"], 0)
     with pytest.raises(PolicyError, match=r"^no observation of agent_0; reset the game first$"):
         team.act({}, {})
     assert team.report().held == 0
-
-
-def test_what_is_not_callable_is_refused():
-    for wrong in (4, {}, {"agent_0": 4}):
-        with pytest.raises(PolicyError, match=r"f\(obs\)"):
-            policies.from_callable(wrong)
-    with pytest.raises(PolicyError, match="dict agent_id -> agent"):
-        policies.from_agents(4)
 
 
 class Agent:
@@ -98,17 +95,33 @@ def test_pyquaticus_style_agents_from_a_class_and_from_a_dict(game):
         given.reset(env, ["agent_0"], 0)
 
 
-def test_agents_without_compute_action_are_refused(game):
-    with pytest.raises(PolicyError, match=r"agent_0 \(int\) has no compute_action"):
-        policies.from_agents({"agent_0": 4}).reset(game[0], ["agent_0"], 0)
+def failing(agent_id, env):
+    raise RuntimeError("no weights")
 
 
-def test_a_factory_that_raises_is_one_clear_error(game):
-    def factory(agent_id, env):
-        raise RuntimeError("no weights")
+class Other:
+    def compute_action(self, agent_id, obs, info):
+        return 4
 
-    with pytest.raises(PolicyError, match="cannot begin a game: RuntimeError: no weights"):
-        policies.from_agents(factory).reset(game[0], ["agent_0"], 0)
+
+@pytest.mark.parametrize(
+    ("agents", "words"),
+    [
+        (4, "dict agent_id -> agent"),
+        ({"agent_0": 4}, r"agent_0 \(int\) has no compute_action"),
+        (failing, "cannot begin a game: RuntimeError: no weights"),
+        (lambda agent_id, env: Other(), r"compute_action of agent agent_0 \(Other\) takes .*called with \(obs, info\)"),
+    ],
+)
+def test_agents_that_cannot_play_are_refused(game, agents, words):
+    with pytest.raises(PolicyError, match=words):
+        policies.from_agents(agents).reset(game[0], ["agent_0"], 0)
+
+
+@pytest.mark.parametrize("wrong", [4, {}, {"agent_0": 4}, lambda obs, info: 4])
+def test_functions_that_cannot_be_called_are_refused(wrong):
+    with pytest.raises(PolicyError, match=r"f\(obs\)"):
+        policies.from_callable(wrong)
 
 
 def test_a_boat_whose_code_raises_holds_and_the_others_play_on(game, caplog):
@@ -142,9 +155,7 @@ def test_every_kind_of_failure_is_told_apart_and_dated(game):
 
     team = policies.from_callable(answer)
     actions = run(team, game, steps=8, own=["agent_0"])
-    usable = [action["agent_0"] == 4 for action in actions]
-    assert usable == [True, False, True, False, False, False, False, False]
-    assert all(action["agent_0"] == policies.HOLD for action, good in zip(actions, usable, strict=True) if not good)
+    assert [action["agent_0"] for action in actions] == [4, policies.HOLD, 4, *[policies.HOLD] * 5]
     found = [(failure.kind, failure.step, failure.count) for failure in team.report().failures]
     assert found == [("no answer", 1, 2), ("not finite", 3, 1), ("no action", 4, 2), ("raised SystemExit", 7, 1)]
     assert team.report().held == 6
@@ -154,9 +165,8 @@ def test_ctrl_c_is_not_swallowed(game):
     def interrupted(observation):
         raise KeyboardInterrupt
 
-    team = policies.from_callable(interrupted)
     with pytest.raises(KeyboardInterrupt):
-        run(team, game)
+        run(policies.from_callable(interrupted), game)
 
 
 def test_slow_answers_are_timed_and_reported(game):
@@ -167,6 +177,7 @@ def test_slow_answers_are_timed_and_reported(game):
         return 16
 
     team = policies.from_callable(answer)
+    assert team.report().lines() == ["callable: 0 calls in 0 games, 0 held; mean 0.000 ms, longest 0.0 ms"]
     run(team, game, steps=3)
     report = team.report()
     assert report.step_ms == pytest.approx(100.0)
@@ -189,86 +200,72 @@ def test_the_report_of_several_games_goes_on_counting(game):
     assert "no answer x 9, first agent_0, game 0, step 0" in report.lines()[1]
 
 
-def test_a_report_before_any_game():
-    report = policies.from_callable(lambda obs: 4, name="new").report()
-    assert report.lines() == ["new: 0 calls in 0 games, 0 held; mean 0.000 ms, longest 0.0 ms"]
+def test_tensors_are_played_and_never_break_the_guard(game):
+    torch = pytest.importorskip("torch")
+    answers = iter([torch.tensor(4), torch.tensor([1.0, 20.0], requires_grad=True), torch.tensor([float("nan"), 0.0])])
+    team = policies.from_callable(lambda obs: next(answers))
+    actions = run(team, game)[0]
+    assert [failure.kind for failure in team.report().failures] == ["not finite"]
+    assert actions["agent_2"] == policies.HOLD
 
 
-def test_acting_without_a_game_is_refused():
-    with pytest.raises(PolicyError, match="call reset"):
-        policies.from_callable(lambda obs: 4).act({}, {})
-
-
-def test_an_error_without_a_place_is_still_described():
-    assert describe_error(ValueError("x")) == "ValueError: x"
-
-
-def keyboard(game, pressed, **options):
-    env, observations, infos = game
-    team = policies.make(KEYBOARD, keys=lambda: set(pressed), **options)
-    team.reset(env, ["agent_0", "agent_1", "agent_2"], 0)
-    return team.act(observations, infos)
+def solution(arguments, body="return 4", prefix=""):
+    return f"""
+    class solution:
+        {prefix}def compute_action({arguments}):
+            {body}
+    """
 
 
 @pytest.mark.parametrize(
-    ("pressed", "action"),
+    ("arguments", "words"),
     [
-        ([], (0.0, 0.0)),
-        (["up"], (2.0, 0.0)),
-        (["w", "left"], (2.0, -45.0)),
-        (["up", "d"], (2.0, 45.0)),
-        (["up", "left", "right"], (2.0, 0.0)),
-        (["up", "left shift"], (1.0, 0.0)),
-        (["a"], (1.0, -90.0)),
-        (["right"], (1.0, 90.0)),
-        (["down", "up"], (1.0, 180.0)),
-        (["x"], (0.0, 0.0)),
+        (OF_2024, r"takes \(agent_id, observation_normalized, observation\).*looks like the interface of 2024"),
+        ("self, agent_id, observation, global_state", "looks like the interface of 2024"),
+        ("self, obs, info", r"takes \(obs, info\), and is called with \(agent_id, full_obs_normalized, full_obs, gl"),
+        ("self", r"takes \(\)"),
+        ("self, a, b, c, d, info", r"takes \(a, b, c, d, info\)"),
+        ("self, a, b, c, d, *, info", r"takes \(a, b, c, d, info=\)"),
+        ("self, *, agent_id", r"takes \(agent_id=\)"),
     ],
 )
-def test_keys_steer_the_humans_boat(game, pressed, action):
-    assert keyboard(game, pressed)["agent_0"] == action
+def test_other_interfaces_are_refused_at_load_with_the_one_that_is_called(write_entry, arguments, words):
+    with pytest.raises(PolicyError, match=words) as caught:
+        policies.make(str(write_entry(solution(arguments))))
+    assert caught.match(r"define compute_action\(self, agent_id, full_obs_normalized, full_obs, global_state\)")
 
 
-def test_the_other_boats_are_played_by_another_policy(game):
-    env, observations, infos = game
-    medium = policies.make("medium")
-    medium.reset(env, ["agent_0", "agent_1", "agent_2"], 0)
-    wanted = medium.act(observations, infos)
-    actions = keyboard(game, ["up"], agent="agent_1")
-    assert actions == {"agent_0": wanted["agent_0"], "agent_1": (2.0, 0.0), "agent_2": wanted["agent_2"]}
-    assert keyboard(game, [], agent=2, others="hold") == dict.fromkeys(actions, (0.0, 0.0))
+@pytest.mark.parametrize(("prefix", "body"), [("async ", "return 4"), ("", "yield 4"), ("async ", "yield 4")])
+def test_answers_that_come_later_are_none(write_entry, prefix, body):
+    with pytest.raises(PolicyError, match=r"generator.*return the action"):
+        policies.make(str(write_entry(solution("self, a, b, c, d", body, prefix))))
 
 
-def test_a_human_alone(game):
-    env, observations, infos = game
-    team = policies.make(KEYBOARD, keys=lambda: {"up"})
-    team.reset(env, ["agent_4"], 0)
-    assert team.act(observations, infos) == {"agent_4": (2.0, 0.0)}
+MADE_WHILE_BUILT = """
+    class solution:
+        def __init__(self): self.compute_action = lambda a, b, c, d: 4
+        def compute_action(self): return 4
+"""
 
 
-class Windowed(MctfEnv):
-    """A game with a made-up window."""
-
-    renderer = None
-
-
-def test_keys_come_from_the_games_window_once_there_is_one():
-    env = Windowed("aamas2024")
-    observations, infos = env.reset(seed=1)
-    env.render_mode = "human"
-    team = policies.make(KEYBOARD, others="hold")
-    team.reset(env, ["agent_0", "agent_1"], 0)
-    assert team.act(observations, infos)["agent_0"] == (0.0, 0.0)
-    env.renderer = type("Renderer", (), {"keys": lambda self: {"up"}})()
-    assert team.act(observations, infos) == {"agent_0": (2.0, 0.0), "agent_1": (0.0, 0.0)}
+@pytest.mark.parametrize(
+    "code",
+    [
+        *map(solution, ("self, a, b, c, d", "self, a, b, c, d, e=None", "self, agent_id, *rest", "*everything")),
+        MADE_WHILE_BUILT,
+    ],
+)
+def test_whatever_can_be_called_is_taken(game, write_entry, load, code):
+    assert run(load(write_entry(code)), game, own=["agent_0"]) == [{"agent_0": 4}]
 
 
-def test_the_keyboard_needs_a_window_and_a_boat_of_its_team(game):
-    env, *_ = game
-    with pytest.raises(PolicyError, match="render_mode='human'"):
-        policies.make(KEYBOARD).reset(env, ["agent_0"], 0)
-    for agent in ("agent_3", 3, -1):
-        with pytest.raises(PolicyError, match="agent is"):
-            policies.make(KEYBOARD, agent=agent, keys=set).reset(env, ["agent_0", "agent_1"], 0)
-    with pytest.raises(PolicyError, match="call reset"):
-        policies.make(KEYBOARD).act({}, {})
+def test_what_tells_nothing_of_itself_is_given_a_chance():
+    class Strange:
+        @property
+        def __signature__(self):
+            raise RuntimeError("not yours")
+
+        def __call__(self):
+            return 4
+
+    assert call_fault(Strange(), ("a", "b")) is None

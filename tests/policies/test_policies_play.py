@@ -82,12 +82,6 @@ def test_seeds_decide_what_is_drawn(name):
     assert not np.array_equal(first, other)
 
 
-@pytest.mark.parametrize("name", DRAWN)
-def test_boats_of_a_team_draw_different_numbers(name):
-    commands, _ = play("aamas2024", name, "hold", steps=200)
-    assert not np.array_equal(commands[:, 0, 0], commands[:, 0, 1])
-
-
 def turned(core, other):
     """Make ``other`` the game of ``core`` turned by 180 deg with the teams swapped."""
     swap = np.array([3, 4, 5, 0, 1, 2])
@@ -136,14 +130,6 @@ def test_restart_touches_the_chosen_games_only():
     np.testing.assert_array_equal(after[1], fresh.act(core, 0)[1])
 
 
-def test_a_full_game_of_medium_teams_has_everything_in_it():
-    _, core = play("mctf2025", "medium", "hidden", steps=6000, n_games=6)
-    assert (core.grabs.sum(axis=0) > 0).all()
-    assert core.captures.sum() > 0
-    assert (core.tags.sum(axis=0) > 0).all()
-    assert core.collisions.mean() > 1.0
-
-
 @pytest.mark.parametrize("name", ["easy_attack", "medium_attack", "hard_attack", "hard"])
 @pytest.mark.parametrize("preset", PRESETS)
 @pytest.mark.parametrize("side", [0, 1])
@@ -190,30 +176,6 @@ def test_waypoints_given_are_visited_in_turn_by_each_boat_from_its_own_start():
     assert (team.waypoints_reached[0] >= 5).all()
 
 
-def test_random_waypoints_are_reached_inside_the_field():
-    core = BatchedMctf("aamas2024")
-    core.state[0, 3:, L.X] = 78.0  # nobody in the way, nobody to tag
-    team = policies.make_batch("waypoints")
-    team.reset(core, 0, 2)
-    assert (team.waypoints_reached == 0).all()
-    actions = np.zeros((1, 6, 2))
-    for _ in range(1500):
-        actions[:, :3] = team.act(core, 0)
-        core.step(actions)
-        assert not core.oob.any()
-    assert (team.waypoints_reached >= 3).all()
-
-
-def test_the_hidden_opponent_takes_its_teams_in_turn():
-    core = BatchedMctf("aamas2024", n_games=4)
-    team = policies.make_batch("hidden")
-    team.reset(core, 1, 3)
-    roles = [{behaviour.name for behaviour in game} for game in team.behaviours]
-    attack, defend = "MEDIUM_ATTACK", "MEDIUM_DEFEND"
-    assert roles == [{defend}, {attack}, {attack, defend}, {defend}]
-    assert [behaviour.name for behaviour in team.behaviours[2]] == [attack, attack, defend]
-
-
 def test_a_batch_policy_wants_to_be_reset_for_its_team():
     core = BatchedMctf("aamas2024")
     team = policies.make_batch("medium")
@@ -238,14 +200,6 @@ def test_boats_of_one_team_only(game):
         team.reset(object(), ["agent_0"], 0)
     with pytest.raises(PolicyError, match="reset"):
         policies.make("medium").act({}, {})
-
-
-def test_part_of_a_team_keeps_its_roles(game):
-    env, *_ = game
-    team = policies.make("medium")
-    team.reset(env, ["agent_5", "agent_3"], 0)
-    assert [behaviour.name for behaviour in team.behaviours.values()] == ["MEDIUM_DEFEND", "MEDIUM_ATTACK"]
-    assert list(team.act({}, {})) == ["agent_5", "agent_3"]
 
 
 @pytest.mark.parametrize("name", SCRIPTED)
@@ -280,3 +234,29 @@ def test_plays_in_a_shielded_env(team):
             assert asked[0] == pytest.approx(wanted[boat, 0])
             assert (asked[1] - wanted[boat, 1] + 180.0) % 360.0 == pytest.approx(180.0)
     assert (np.hypot(*(game.view().position - start)[:3].T) > 0.2).all()
+
+
+@pytest.mark.parametrize("name", ["medium", "hard"])  # easy does not get past boats that lie on its way
+def test_a_team_against_boats_that_hold_captures_at_corners(name):
+    core = BatchedMctf(GameConfig.preset("mctf2026", max_time_s=400.0, power_play_share=0.0), 2, seed=1)
+    teams = [policies.make_batch(name), policies.make_batch("hold")]
+    for team, policy in enumerate(teams):
+        policy.reset(core, team, 0)
+    for _ in range(400):
+        core.step(np.concatenate([policy.act(core, team) for team, policy in enumerate(teams)], axis=1))
+    assert (core.captures[:, 0] >= 1).all()
+
+
+def test_a_carrier_steers_for_the_nearer_corner_of_its_own_side():
+    env = MctfEnv(GameConfig.preset("mctf2026"), seed=0)
+    places = {"agent_0": (120.0, 60.0), "agent_5": (40.0, 20.0)}
+    for team, carrier, corner in ((0, "agent_0", (10.0, 70.0)), (1, "agent_5", (150.0, 10.0))):
+        policy = policies.make("easy", roles="attack")
+        env.reset(options={"init_dict": {"agent_position": places, "agent_has_flag": {carrier: True}}})
+        policy.reset(env, env.possible_agents[3 * team : 3 * team + 3], 0)
+        medium = policies.make("medium", roles="attack", reach_m=1.0)
+        medium.reset(env, env.possible_agents[3 * team : 3 * team + 3], 0)
+        _, bearing = medium.act({}, {})[carrier]
+        player = env.players[carrier]
+        towards = np.degrees(np.arctan2(corner[0] - player.pos[0], corner[1] - player.pos[1])) - player.heading
+        assert (bearing - towards + 180.0) % 360.0 - 180.0 == pytest.approx(0.0, abs=1e-6)

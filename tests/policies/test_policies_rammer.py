@@ -2,12 +2,12 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
-from steerclear.policies.scripted.ram import meeting_time_s
+from steerclear.policies.scripted.boats import meeting_time_s
 from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.platforms import layout as L
 
@@ -15,6 +15,7 @@ near = st.floats(-50.0, 50.0)
 slow = st.floats(-3.0, 3.0)
 
 
+@settings(deadline=None)  # the first call may compile
 @given(near, near, slow, slow, st.floats(0.1, 3.0))
 def test_at_the_meeting_time_the_target_is_as_far_as_the_rammer_gets(east, north, v_east, v_north, speed):
     time = meeting_time_s(east, north, v_east, v_north, speed)
@@ -23,15 +24,6 @@ def test_at_the_meeting_time_the_target_is_as_far_as_the_rammer_gets(east, north
     reached = math.hypot(east + v_east * time, north + v_north * time) - speed * time
     guess = min(distance / speed, 30.0)
     assert abs(reached) <= 1e-6 * (1.0 + distance) or time == pytest.approx(guess)
-
-
-@given(near, near, slow, slow, st.floats(0.1, 3.0))
-def test_no_earlier_meeting_is_missed(east, north, v_east, v_north, speed):
-    time = meeting_time_s(east, north, v_east, v_north, speed)
-    for earlier in np.linspace(0.0, 0.999, 40) * min(time, 30.0):
-        gap = math.hypot(east + v_east * earlier, north + v_north * earlier) - speed * earlier
-        if math.hypot(east, north) > 1e-6 and time < 30.0 and time != pytest.approx(math.hypot(east, north) / speed):
-            assert gap > -1e-6
 
 
 @pytest.mark.parametrize(
@@ -78,13 +70,6 @@ def test_hits_a_stationary_boat(preset, side, place):
     assert chase(preset, place, (0.0, 0.0), steps=900, side=side) < 1.5
 
 
-@pytest.mark.parametrize("preset", ["aamas2024", "mctf2025"])
-@pytest.mark.parametrize(("place", "heading"), [((0.3, 0.1), 0.0), ((0.9, 0.8), -90.0), ((0.6, 0.9), 180.0)])
-def test_hits_a_boat_on_a_straight_course(preset, place, heading):
-    speed = 1.0
-    assert chase(preset, place, (heading, speed), steps=400) < 1.5
-
-
 def test_leads_its_target():
     """It steers ahead of a crossing boat, not at it."""
     core = BatchedMctf(GameConfig.preset("aamas2024", team_size=1))
@@ -126,10 +111,6 @@ def test_options_are_checked():
             policies.make("rammer", speed_fraction=speed_fraction)
     with pytest.raises(PolicyError, match="True or False"):
         policies.make("rammer", target_team_mates="yes")
-
-
-def test_speed_fraction_is_the_share_of_top_speed():
-    core = BatchedMctf("aamas2024")
-    team = policies.make_batch("rammer", speed_fraction=0.25)
+    core, team = BatchedMctf("aamas2024"), policies.make_batch("rammer", speed_fraction=0.25)
     team.reset(core, 0, 0)
     assert (team.act(core, 0)[..., 0] == 0.5).all()

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from steerclear.policies.scripted import layout as S
-from steerclear.policies.scripted.dispatch import command_team
+from steerclear.policies.scripted.batch import command_team
 from steerclear.policies.scripted.layout import Behaviour, Game
 from steerclear.shield.platforms import layout as L
 

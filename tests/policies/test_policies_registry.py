@@ -4,9 +4,9 @@ from pathlib import Path
 import pytest
 from steerclear import policies
 from steerclear.env.core import BatchedMctf
-from steerclear.policies.protocol import BatchPolicy, TeamPolicy
+from steerclear.policies.protocol import TeamPolicy
 from steerclear.policies.scripted.layout import Behaviour
-from steerclear.policies.scripted.plan import default_roles, in_roles
+from steerclear.policies.scripted.plan import Plan
 from steerclear.shield.exceptions import PolicyError
 
 DOCS = Path(__file__).parents[2] / "docs" / "policies.md"
@@ -23,14 +23,6 @@ def test_every_name_builds_a_policy_that_names_itself(name):
     team = policies.make(name)
     assert isinstance(team, TeamPolicy)
     assert team.name == name
-
-
-SINGLE = {"keyboard", *policies.entrants()}
-
-
-@pytest.mark.parametrize("name", [name for name in policies.names() if name not in SINGLE])
-def test_every_scripted_name_builds_a_batch_policy(name):
-    assert isinstance(policies.make_batch(name), BatchPolicy)
 
 
 def test_an_unknown_name_lists_near_matches_and_all_names():
@@ -75,29 +67,18 @@ def test_a_batch_takes_no_single_game_policies(tmp_path):
             policies.make_batch(name)
 
 
-def test_paths_that_do_not_exist_are_reported_as_paths():
-    for path in ("entries/none", "none.zip"):
-        with pytest.raises(PolicyError, match="no submission at"):
-            policies.make(path)
-
-
 @pytest.mark.parametrize(("team_size", "defenders"), [(1, 0), (2, 1), (3, 1), (4, 1), (5, 2), (6, 2), (9, 3)])
 def test_a_third_of_a_team_defends(team_size, defenders):
-    roles = default_roles(team_size)
-    assert len(roles) == team_size
-    assert roles == sorted(roles)  # attackers first
-    assert roles.count("defend") == defenders
-
-
-def cast(roles, team_size=3):
-    return in_roles(Behaviour.EASY_ATTACK, Behaviour.EASY_DEFEND, roles)(team_size, 0)
+    cast = Plan((Behaviour.EASY_ATTACK, Behaviour.EASY_DEFEND)).cast(team_size, 0)
+    assert len(cast) == team_size
+    assert cast == sorted(cast)  # attackers first
+    assert cast.count(Behaviour.EASY_DEFEND) == defenders
 
 
 def test_roles_are_words_in_a_string_or_a_list():
-    a, d = Behaviour.EASY_ATTACK, Behaviour.EASY_DEFEND
-    assert cast("attack, Defend,attack") == cast(["attack", "defend", "attack"]) == [a, d, a]
-    assert cast("defend") == [d, d, d]
-    assert cast(None) == [a, a, d]
+    for roles in ("attack, Defend,attack", ["attack", "defend", "attack"]):
+        assert [one.name[5] for one in policies.make_batch("easy", roles=roles).plan.cast(3, 0)] == ["A", "D", "A"]
+    assert policies.make_batch("easy", roles="defend").plan.cast(3, 0) == [Behaviour.EASY_DEFEND] * 3
 
 
 def test_wrong_roles_are_explained():
@@ -106,7 +87,7 @@ def test_wrong_roles_are_explained():
     with pytest.raises(PolicyError, match="empty"):
         policies.make("easy", roles=[])
     with pytest.raises(PolicyError, match="names 2 boats for a team of 3"):
-        cast("attack,defend")
+        policies.make_batch("easy", roles="attack,defend").plan.cast(3, 0)
 
 
 def behaviours(name, game=None, seed=0, **options):
@@ -167,8 +148,3 @@ def test_reach_decides_how_far_away_opponents_push():
     near.reset(core, 0, 0)
     core.state[0, 3:, :2] = [[100.0, 60.0], [101.0, 60.0], [102.0, 60.0]]
     assert abs(far.act(core, 0) - near.act(core, 0))[0, 0, 1] > 5.0
-
-
-def test_no_name_at_all_is_no_folder():
-    with pytest.raises(PolicyError, match="unknown policy ''"):
-        policies.make("")

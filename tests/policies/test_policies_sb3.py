@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from gymnasium.spaces import Box, Discrete
 from steerclear import policies
-from steerclear.policies.sb3 import saved_algorithm
+from steerclear.policies.sb3 import algorithm_of, saved_settings
 from steerclear.shield.exceptions import PolicyError
 
 OWN = ["agent_0", "agent_1"]
@@ -113,7 +113,7 @@ def test_the_algorithm_is_told_from_the_file(tmp_path, mark, algorithm):
     path = tmp_path / "model.zip"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("data", json.dumps({mark: 1}))
-    assert saved_algorithm(path) == algorithm
+    assert algorithm_of(saved_settings(path)) == algorithm
 
 
 class Bomb:

@@ -72,19 +72,6 @@ def test_a_zip_that_reaches_outside_is_refused_whole(tmp_path, name):
         check_members(tmp_path, [zipfile.ZipInfo("solution.py"), info], 10**9)
 
 
-def test_names_as_windows_writes_them_are_told(tmp_path):
-    info = zipfile.ZipInfo("placeholder")
-    info.filename = "team\\solution.py"
-    with pytest.raises(PolicyError, match="has a backslash; zip it with / in its names"):
-        check_members(tmp_path, [info], 10**9)
-
-
-def test_a_zip_without_an_entry_is_named_itself(tmp_path):
-    source = pack(tmp_path / "mine.zip", **{"readme.txt": "no entry"})
-    with pytest.raises(PolicyError, match=r"mine\.zip needs one solution\.py at its top, or in its only folder"):
-        Stage(source)
-
-
 def test_an_entry_that_lies_too_deep_is_shown(tmp_path):
     source = pack(tmp_path / "mine.zip", **{"a/b/solution.py": SOLUTION})
     with pytest.raises(PolicyError, match=r"none there, but a/b/solution\.py; zip what lies beside it"):
@@ -125,26 +112,6 @@ def test_the_unpacked_size_is_bounded(tmp_path):
     assert len(staged(source, max_bytes=2_000_000)["zeros.bin"]) == 1_000_000
 
 
-def test_the_number_of_files_is_bounded(tmp_path):
-    members = [zipfile.ZipInfo(f"{k}") for k in range(MAX_FILES + 1)]
-    with pytest.raises(PolicyError, match="leave out"):
-        check_members(tmp_path, members, 10**9)
-
-
-def test_an_encrypted_zip_is_refused(tmp_path):
-    member = zipfile.ZipInfo("solution.py")
-    member.flag_bits |= 1
-    with pytest.raises(PolicyError, match="without a password"):
-        check_members(tmp_path, [member], 10**9)
-
-
-def test_unusual_compression_is_refused(tmp_path):
-    member = zipfile.ZipInfo("solution.py")
-    member.compress_type = zipfile.ZIP_LZMA
-    with pytest.raises(PolicyError, match="plain deflate"):
-        check_members(tmp_path, [member], 10**9)
-
-
 def test_broken_zips_are_one_clear_error(tmp_path):
     good = pack(tmp_path / "good.zip", **{"solution.py": SOLUTION * 50}).read_bytes()
     spoiled = bytearray(good)
@@ -154,11 +121,6 @@ def test_broken_zips_are_one_clear_error(tmp_path):
         source.write_bytes(content)
         with pytest.raises(PolicyError, match="cannot be unpacked"):
             Stage(source)
-
-
-def test_what_is_not_there_is_reported(tmp_path):
-    with pytest.raises(PolicyError, match="no submission at"):
-        Stage(tmp_path / "nothing.zip")
 
 
 def hold_a_stage(source, told):
@@ -192,3 +154,20 @@ def test_a_forked_process_does_not_take_its_parents_stage_away(tmp_path):
     assert stage.folder.exists()
     stage.close()
     assert not stage.folder.exists()
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"filename": "team\\solution.py"}, "has a backslash; zip it with / in its names"),
+        ({"flag_bits": 1}, "without a password"),
+        ({"compress_type": zipfile.ZIP_LZMA}, "plain deflate"),
+        ({}, "leave out"),
+    ],
+)
+def test_members_that_are_unusual_or_too_many_are_refused(tmp_path, changes, words):
+    member = zipfile.ZipInfo("solution.py")
+    for name, value in changes.items():
+        setattr(member, name, value)
+    with pytest.raises(PolicyError, match=words):
+        check_members(tmp_path, [member] * (1 if changes else MAX_FILES + 1), 10**9)

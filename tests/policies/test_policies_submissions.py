@@ -2,13 +2,13 @@ import os
 import random
 import shutil
 import sys
+import warnings
 from types import ModuleType
 
 import numpy as np
 import pytest
 from steerclear import policies
-from steerclear.policies.submissions.history import ObservationSettings
-from steerclear.policies.submissions.loader import GlobalState
+from steerclear.policies.submissions.loader import GlobalState, ages_of
 from steerclear.shield.exceptions import PolicyError
 
 OWN = ["agent_0", "agent_1", "agent_2"]
@@ -77,8 +77,10 @@ def test_a_submission_finds_its_files_and_modules(game, write_entry, load, as_zi
     assert not {name for name in set(sys.modules) - before[2] if name.startswith("submission_")}
 
 
-def test_two_submissions_with_modules_of_the_same_name_stay_apart(game, write_entry, load):
+def test_two_submissions_and_other_code_with_modules_of_the_same_name_stay_apart(game, write_entry, load, monkeypatch):
     env, observations, infos = game
+    mine = ModuleType("helper")
+    monkeypatch.setitem(sys.modules, "helper", mine)
     teams = [load(write_entry(AT_HOME, name=f"entry{side}", **files(side))) for side in (3, 5)]
     teams[0].reset(env, OWN, 0)
     teams[1].reset(env, ["agent_3", "agent_4", "agent_5"], 0)
@@ -86,24 +88,7 @@ def test_two_submissions_with_modules_of_the_same_name_stay_apart(game, write_en
         for team, side in zip(teams, (3, 5), strict=True):
             assert set(team.act(observations, infos).values()) == {side}
     assert [team.report().failures for team in teams] == [(), ()]
-
-
-def test_modules_of_other_code_with_the_same_name_come_back(game, write_entry, load, monkeypatch):
-    mine = ModuleType("helper")
-    mine.SIDE = -1
-    monkeypatch.setitem(sys.modules, "helper", mine)
-    team = load(write_entry(AT_HOME, **files(side=2)))
-    assert set(play(team, game)[0].values()) == {2}
     assert sys.modules["helper"] is mine
-
-
-def test_a_working_directory_that_is_gone_does_not_matter(game, write_entry, load, tmp_path, monkeypatch):
-    team = load(write_entry(AT_HOME, **files(side=2)))
-    gone = tmp_path / "gone"
-    gone.mkdir()
-    monkeypatch.chdir(gone)
-    gone.rmdir()
-    assert set(play(team, game)[0].values()) == {2}
 
 
 ECHO = """
@@ -275,15 +260,15 @@ def config_module(**settings):
 
 
 def test_observation_settings_are_read():
-    assert ObservationSettings.from_module(ModuleType("empty")).ages == (0,)
+    assert ages_of(ModuleType("empty")) == (0,)
     settings = {"short_obs_hist_length": 3, "short_obs_hist_interval": 1, "long_obs_hist_length": 3}
     settings["long_obs_hist_interval"] = 4
-    assert ObservationSettings.from_module(config_module(**settings)).ages == (0, 1, 2, 4, 8)
+    assert ages_of(config_module(**settings)) == (0, 1, 2, 4, 8)
     with pytest.raises(PolicyError, match="lidar"):
-        ObservationSettings.from_module(config_module(lidar_obs=True))
+        ages_of(config_module(lidar_obs=True))
     for wrong in (0, 1.5, True, "3"):
         with pytest.raises(PolicyError, match="short_obs_hist_length"):
-            ObservationSettings.from_module(config_module(short_obs_hist_length=wrong))
+            ages_of(config_module(short_obs_hist_length=wrong))
 
 
 def test_a_submission_trained_on_past_observations_gets_them(game, write_entry, load):
@@ -302,3 +287,73 @@ def test_a_submission_trained_on_past_observations_gets_them(game, write_entry, 
     assert raw[1] == echoed(team)[1][2]["agent_3"][0]
     play(team, game, own=["agent_3"])  # a new game forgets
     np.testing.assert_array_equal(echoed(team)[-1][1]["agent_3"][1], first)
+
+
+UPSET = """
+    import os, random, sys, warnings
+    import numpy as np
+
+    class solution:
+        def __init__(self):
+            np.seterr(all="raise"); np.random.seed(7); random.seed(7)
+            os.environ["UPSET"] = "1"; os.environ.pop("KEPT", None); os.chdir("/")
+            sys.path.append("/upset"); warnings.simplefilter("ignore")
+
+        def compute_action(self, agent_id, *rest):
+            kept = np.geterr()["over"], os.environ.get("UPSET"), "KEPT" in os.environ, "/upset" in sys.path
+            assert kept == ("raise", "1", False, True), kept
+            return random.randrange(8)
+"""
+
+
+def state():
+    """Everything that is to be as it was."""
+    return {
+        "errors": np.geterr(),
+        "chance": (random.getstate(), np.random.get_state()[1].tolist()),  # noqa: NPY002
+        "environment": dict(os.environ),
+        "folder": os.getcwd(),
+        "path": list(sys.path),
+        "warnings": list(warnings.filters),
+    }
+
+
+def test_settings_of_the_process_stay_with_the_submission(game, write_entry, load, monkeypatch):
+    env, observations, infos = game
+    monkeypatch.setenv("KEPT", "1")
+    before = state()
+    team = load(write_entry(UPSET))
+    assert state() == before
+    team.reset(env, ["agent_0"], 5)
+    actions = [team.act(observations, infos)["agent_0"] for _ in range(10)]
+    assert team.report().failures == ()
+    assert state() == before
+    random.seed(7)
+    assert actions == [random.randrange(8) for _ in range(10)], "its own draws go on where they were"
+
+
+def test_settings_of_torch_stay_with_the_submission(game, write_entry, load):
+    torch = pytest.importorskip("torch")
+    env, observations, infos = game
+    before = torch.get_default_dtype(), torch.is_grad_enabled(), torch.get_rng_state().tolist()
+    head = "import torch\ntorch.set_default_dtype(torch.float64); torch.set_grad_enabled(False); torch.rand(3)\n"
+    body = "class solution:\n    def compute_action(self, *rest):\n        "
+    team = load(write_entry(head + body + "return 4 if torch.rand(1).dtype == torch.float64 else 16\n"))
+    team.reset(env, ["agent_0"], 5)
+    assert team.act(observations, infos) == {"agent_0": 4}
+    assert (torch.get_default_dtype(), torch.is_grad_enabled(), torch.get_rng_state().tolist()) == before
+
+
+def test_two_submissions_do_not_draw_from_one_anothers_chance(game, write_entry, load):
+    env, observations, infos = game
+    dice = "import random\nclass solution:\n    def compute_action(self, *rest):\n        return random.randrange(8)\n"
+    alone, beside, other = (load(write_entry(dice, name=f"dice{k}")) for k in range(3))
+    alone.reset(env, ["agent_0"], 3)
+    drawn = [alone.act(observations, infos) for _ in range(6)]
+    beside.reset(env, ["agent_0"], 3)
+    other.reset(env, ["agent_3"], 4)
+    again = []
+    for _ in range(6):
+        again.append(beside.act(observations, infos))
+        other.act(observations, infos)
+    assert again == drawn

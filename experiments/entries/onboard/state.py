@@ -60,11 +60,7 @@ class Observation(NamedTuple):
 
 
 def see(spec: GameSpec, state: Mapping[Any, Any]) -> Observation:
-    """Read the global state.
-
-    Raises:
-        KeyError, ValueError, TypeError: it lacks a boat, or tells no metres.
-    """
+    """Read the global state."""
     rows = np.zeros((len(spec.agent_ids), L.N_STATE))
     rows[:, [L.THRUST, L.RUDDER, L.SPEED_ERROR, L.HEADING_ERROR]] = math.nan
     flags = np.zeros((4, len(spec.agent_ids)), np.bool_)

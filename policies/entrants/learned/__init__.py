@@ -1,40 +1,50 @@
-"""Learned teams: networks of numpy weights, played without torch."""
+"""Learned teams: networks of numpy weights, played without torch.
+
+Each of our own has its weights, the config that trains it again and its curve in ``teams/``, and is entered where its
+weights are there.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-from .kinds import batch_of as batch_of
-from .kinds import team_of as team_of
-from .network import preset_in
+from ..catalogue import entrant
+from .cloned import Cloned
+from .network import Network, preset_in
+from .network import read_weights as read_weights
 from .play import LearnedBatch, LearnedTeam
 from .raids import RaidsBatch, RaidsTeam
-from .weights_file import read_weights
 
 WEIGHTS, SB3 = "weights:", "sb3:"
 TEAMS = Path(__file__).parent / "teams"
-"""Where the weights of our learned entrants lie, with config and curve beside them."""
+ABOUT = {
+    "jin": ("capture-seeking PPO, a stand-in: the team's code was never shared", "Jin-Indep"),
+    "leprell": ("decentralised PPO on captures and grabs alone (Leprell-USMA)", "Leprell-USMA"),
+    "richley": ("QMIX, and PPO once the flag is held (Richley-NIWC-ATL)", "Richley-NIWC-ATL"),
+    "swell": ("PPO by the rules of aamas2024 against medium alone, begun with jin", ""),
+    "surge": ("PPO in the game of 2025 against medium alone, begun with jin", ""),
+    "riptide": ("undertow's raids, their numbers given by a network: for play with a shield", ""),
+    "ours": ("PPO in the game of 2025, begun with surge: the team to start from, with the shield", ""),
+}
+FILES = {name: TEAMS / f"{name}.npz" for name in ABOUT if (TEAMS / f"{name}.npz").exists()}
+"""Weights of the teams that are networks."""
+CHOOSER = TEAMS / "crowley.npz"
 
 
-class Builder(NamedTuple):
-    """What builds a batch policy, and its first arguments."""
+def team_of(network: Network, name: str = "weights", sample: bool = False) -> LearnedTeam | RaidsTeam:
+    """A network as the team policy of its kind."""
+    return (RaidsTeam if network.kind == "raids" else LearnedTeam)(network, name, sample)
 
-    build: Callable[..., Any]
-    first: tuple[Any, ...]
+
+def batch_of(network: Network, name: str = "weights", sample: bool = False) -> LearnedBatch | RaidsBatch:
+    """The same for a batch of games."""
+    return (RaidsBatch if network.kind == "raids" else LearnedBatch)(network, name, sample)
 
 
 def load_weights(path: str | Path, sample: bool = False) -> LearnedTeam | RaidsTeam:
-    """An exported network as a team policy.
-
-    Args:
-        path: the ``.npz`` that ``steerclear export`` wrote.
-        sample: draw actions with the network's probabilities instead of taking the likeliest.
-
-    Raises:
-        PolicyError: no such file, or none of ours.
-    """
+    """An exported network as a team policy."""
     return team_of(read_weights(path), Path(path).stem, sample)
 
 
@@ -51,44 +61,43 @@ def load_trained(path: str | Path, sample: bool = False, interval: int | None = 
 
 
 def load_sb3_batch(path: str | Path, sample: bool = False, interval: int | None = None) -> LearnedBatch:
-    """A saved Stable-Baselines3 model for a batch of games. Its tensors alone are read: none of its pickles runs.
-
-    Args:
-        path: the zip ``model.save`` wrote.
-        sample: draw actions with the network's probabilities.
-        interval: game steps for which a decision is held; None: as it learned, 1 where the file does not say.
-
-    Raises:
-        PolicyError: torch is missing, or the file is no model this can play.
-    """
+    """A saved Stable-Baselines3 model for a batch of games. Its tensors alone are read: none of its pickles runs."""
     from .sb3_file import read_sb3
 
     return LearnedBatch(read_sb3(path, interval), Path(path).stem, sample)
 
 
-def batch_builder(name: str) -> Builder | None:
-    """What builds the batch policy of that name; None where it is no learned one."""
-    from .entered import FILES
-
-    if name.startswith(WEIGHTS):
-        return Builder(load_weights_batch, (name.removeprefix(WEIGHTS),))
+def batch_builder(name: str) -> tuple[Callable[..., Any], tuple[Any, ...]] | None:
+    """What builds the batch policy of that name, and its first arguments; None where it is no learned one."""
     if name.startswith(SB3):
-        return Builder(load_sb3_batch, (name.removeprefix(SB3),))
-    if name in FILES:
-        return Builder(load_weights_batch, (FILES[name],))
-    return None
+        return load_sb3_batch, (name.removeprefix(SB3),)
+    path = name.removeprefix(WEIGHTS) if name.startswith(WEIGHTS) else FILES.get(name)
+    return None if path is None else (load_weights_batch, (path,))
 
 
 def learned_in(name: str) -> str:
-    """Preset that the policy of that name learned in; empty where it is no learned one, or does not say.
-
-    Raises:
-        PolicyError: its file cannot be read.
-    """
+    """Preset that the policy of that name learned in; empty where it is no learned one, or does not say."""
     from ...sb3 import read_card
-    from .entered import FILES
 
     if name.startswith(SB3):
         return preset_in(read_card(Path(name.removeprefix(SB3)).expanduser()))
     path = name.removeprefix(WEIGHTS) if name.startswith(WEIGHTS) else FILES.get(name)
     return "" if path is None else read_weights(path).preset
+
+
+def _enter(name: str) -> None:
+    def build(sample: bool = False) -> LearnedTeam | RaidsTeam:
+        return team_of(read_weights(FILES[name]), name, sample)
+
+    build.__qualname__ = name
+    entrant(name, *ABOUT[name])(build)
+
+
+for _name in FILES:
+    _enter(_name)
+
+if CHOOSER.exists():
+
+    @entrant("crowley", "options chosen as a scripted demonstrator does, by cloning (Crowley-BU-LL)", "Crowley-BU-LL")
+    def _crowley() -> Cloned:
+        return Cloned(CHOOSER)

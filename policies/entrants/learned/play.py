@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.jit import Array, BoolArray
 from steerclear.shield.platforms import layout as L
 
-from ...scripted.team import boat_numbers, game_core
+from ...scripted.team import BatchTeam
 from .network import Network
 
 DISABLED = "is_disabled"
@@ -38,11 +38,7 @@ class LearnedBatch:
         self._team = -1
 
     def reset(self, core: Any, team: int, seed: int, boats: Any = None) -> None:
-        """Begin all games, as `ScriptedBatch.reset`.
-
-        Raises:
-            PolicyError: the network was made for other observations, or for teams of another size.
-        """
+        """Begin all games, as `ScriptedBatch.reset`."""
         own = np.flatnonzero(core.team == team)
         self._team, self._boats = team, own if boats is None else np.asarray(boats, np.int64)
         self._roles = np.searchsorted(own, self._boats)
@@ -83,11 +79,7 @@ class LearnedBatch:
             self._streams[game] = (int(seed) + int(game)) & _SEED_MASK
 
     def act(self, core: Any, team: int) -> Array:
-        """Commands (B, n_team, 2), speed m/s and relative heading deg; the array is reused by the next call.
-
-        Raises:
-            PolicyError: `reset` was not called for this team and number of games.
-        """
+        """Commands (B, n_team, 2), speed m/s and relative heading deg; the array is reused by the next call."""
         if team != self._team or core.n_games != self._out.shape[0]:
             raise PolicyError(f"policy {self.name!r} was not reset for team {team} of these games; call reset first")
         return self.answer(core.observations[:, self._boats], core.state[:, self._boats, L.HEADING])
@@ -130,42 +122,13 @@ def _game_words(preset: str) -> str:
     return f"--preset {preset}, with its team_size and obstacles" if preset else "preset, team_size, obstacles"
 
 
-class LearnedTeam:
-    """The same in one game: a thin front over `LearnedBatch`.
-
-    Args:
-        network: the network.
-        name: name for records and reports.
-        sample: see `LearnedBatch`.
-    """
+class LearnedTeam(BatchTeam):
+    """The same in one game: a front over `LearnedBatch`, whose arguments it takes; it sees what it is handed."""
 
     def __init__(self, network: Network, name: str = "weights", sample: bool = False) -> None:
-        self.name = name
-        self._batch = LearnedBatch(network, name, sample)
-        self._ids: list[str] = []
+        super().__init__(LearnedBatch(network, name, sample))
 
-    def reset(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:
-        """Begin a game.
-
-        Raises:
-            PolicyError: not an `MctfEnv`, unknown boats, or a game the network was not made for.
-        """
-        self._core = game_core(env)
-        boats = boat_numbers(self._core, agent_ids)
-        self._boats, self._ids = boats, list(agent_ids)
-        self._batch.reset(self._core, int(self._core.team[boats[0]]), seed, boats)
-
-    def act(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
-        """Actions (speed m/s, relative heading deg) of the boats.
-
-        Raises:
-            PolicyError: `reset` was not called.
-        """
-        if not self._ids:
-            raise PolicyError(f"policy {self.name!r} has no game; call reset(env, agent_ids, seed) first")
+    def _rows(self, observations: Mapping[str, np.ndarray]) -> Array:
         seen = np.stack([observations[agent_id] for agent_id in self._ids])[None]
         rows = self._batch.answer(seen, self._core.state[:, self._boats, L.HEADING])[0]
-        return {
-            agent_id: (float(speed), wrap_bearing(float(turn)))
-            for agent_id, (speed, turn) in zip(self._ids, rows, strict=True)
-        }
+        return np.array([(speed, wrap_bearing(float(turn))) for speed, turn in rows])

@@ -16,13 +16,12 @@ from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.jit import Array, BoolArray
 from steerclear.shield.platforms import layout as L
 
-from ..front import BatchFront
 from ..plane import SLOWEST, SLOWING_M
+from ..play import BatchFront
 from ..sight import is_turned, look
-from ..undertow.aims import aim_of
-from ..undertow.chart import Chart
-from ..undertow.raid import Phase, Raid
+from ..undertow.raid import Chart, Phase, Raid
 from ..undertow.shape import SCRIPTED
+from ..undertow.team import aim_of
 from .network import Network
 
 Numbers = NDArray[np.int64]
@@ -58,11 +57,7 @@ class RaidsBatch:
         self._team = -1
 
     def reset(self, core: Any, team: int, seed: int) -> None:
-        """Begin all games.
-
-        Raises:
-            PolicyError: the teams have not three boats.
-        """
+        """Begin all games."""
         own = np.flatnonzero(core.team == team)
         if own.size != BOATS or core.n_boats != 2 * BOATS:
             raise PolicyError(f"policy {self.name!r} plays {BOATS} boats against {BOATS}; play it with team_size 3")
@@ -83,11 +78,7 @@ class RaidsBatch:
             self.raids[game] = Raid(look(self._core, self._team, int(game)))
 
     def act(self, core: Any, team: int) -> Array:
-        """Commands (B, 3, 2), speed m/s and relative heading deg; the array is reused by the next call.
-
-        Raises:
-            PolicyError: `reset` was not called for this team and number of games.
-        """
+        """Commands (B, 3, 2), speed m/s and relative heading deg; the array is reused by the next call."""
         if team != self._team or core.n_games != self._left.size:
             raise PolicyError(f"policy {self.name!r} was not reset for team {team} of these games; call reset first")
         due = np.flatnonzero(self._left == 0)

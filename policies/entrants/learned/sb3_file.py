@@ -31,9 +31,6 @@ def read_sb3(path: str | Path, interval: int | None = None) -> Network:
     Args:
         path: the zip.
         interval: game steps for which a decision is held; None: as it learned.
-
-    Raises:
-        PolicyError: no such file, torch is missing, or it is no model whose actor is a plain network.
     """
     file = Path(path).expanduser()
     if not file.is_file():
@@ -57,11 +54,7 @@ def add_card(file: Path | io.BytesIO, card: Mapping[str, Any]) -> None:
 
 
 def check_whole(file: Path, card: Mapping[str, Any]) -> None:
-    """Refuse a model that is half of what plays.
-
-    Raises:
-        PolicyError: it is.
-    """
+    """Refuse a model that is half of what plays."""
     if card.get(TAKES_OVER):
         raise PolicyError(
             f"{file} holds one network of two, the one that takes over while the flag is held; give final.npz or "
@@ -98,11 +91,7 @@ def _activation(saved: Mapping[str, Any]) -> str:
 def network_of_tensors(
     tensors: Mapping[str, Any], activation: str, interval: int | None, card: Mapping[str, Any]
 ) -> Network:
-    """The actor among a policy's tensors by SB3's names.
-
-    Raises:
-        KeyError, ValueError: they are others.
-    """
+    """The actor among a policy's tensors by SB3's names."""
     numbers = {name: np.asarray(value) for name, value in tensors.items()}
     head_w, head_b = numbers["action_net.weight"], numbers["action_net.bias"]
     own = "features_extractor.angles" in numbers

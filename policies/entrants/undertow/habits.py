@@ -1,4 +1,4 @@
-"""Opponents that keep a habit: who circles, patrols or drives home is known ahead of time."""
+"""Opponents that keep a habit, known ahead of time, and who stays at home to guard the flag."""
 
 from __future__ import annotations
 
@@ -21,6 +21,13 @@ PROVEN, WARY = 15, 45
 once is wrong at several looks, and so is not relied on for most of a game."""
 TAGGED, HOME = 3, 4
 """Columns of a look: after x, y, m, and heading, rad, whether it is tagged, and on its own side."""
+
+COME_M = 3.0
+"""An opponent so far beyond the dividing line is no guard, m."""
+ROAMS_SHARE, QUIET_S = 0.3, 15.0
+"""Nor is one so near to the line, in shares of the way from there to its flag, while none of ours has been within
+`LURE_M` of the line or beyond it for so long, s: a guard goes back to its flag."""
+LURE_M = 1.0
 
 Track = NDArray[np.float64]
 """What an opponent does at the next looks, (looks, 3): x, y, m, and 1 where it is on its own side and not tagged."""
@@ -50,7 +57,8 @@ class Habits:
         self._next_s = sight.time + SAMPLE_S
         for number, foe in enumerate(sight.foes):
             self._compare(number, foe)
-            self._looks[number] = [*self._looks[number], _row(foe)][-KEPT:]
+            row = foe.x, foe.y, wrap(foe.heading), float(foe.tagged), float(foe.on_side)
+            self._looks[number] = [*self._looks[number], row][-KEPT:]
             self._expected[number] = [*self._expected[number], self._again(number, LEAD)][-LEAD:]
         return True
 
@@ -90,5 +98,37 @@ class Habits:
         return found
 
 
-def _row(foe: Boat) -> tuple[float, ...]:
-    return foe.x, foe.y, wrap(foe.heading), float(foe.tagged), float(foe.on_side)
+class Watch:
+    """Who has been where.
+
+    Attributes:
+        habits: of the opponents.
+        nobody: none stays at home, as was remembered of the game.
+    """
+
+    def __init__(self, sight: Sight) -> None:
+        self.habits, self.nobody = Habits(len(sight.foes)), False
+        self._left, self._numbers = set[int](), range(len(sight.foes))
+        self._lured_s = sight.time
+
+    def look(self, sight: Sight) -> bool:
+        """Note who is where; whether habits were looked at."""
+        if any(boat.x > sight.line - LURE_M for boat in sight.own):
+            self._lured_s = sight.time
+        near = sight.line - COME_M
+        roams = sight.line + ROAMS_SHARE * (sight.base[0] - sight.line)
+        quiet = sight.time - self._lured_s > QUIET_S
+        self._left |= {
+            n for n, foe in enumerate(sight.foes) if foe.x < near or (quiet and foe.x < roams and not foe.tagged)
+        }
+        return self.habits.look(sight)
+
+    @property
+    def unguarded(self) -> bool:
+        """Whether every opponent has left its flag at some time, or keeps a habit whoever comes."""
+        return self.nobody or all(number in self._left or self.habits.settled(number) for number in self._numbers)
+
+    @property
+    def timed(self) -> bool:
+        """Whether some opponent keeps a habit."""
+        return any(self.habits.settled(number) for number in self._numbers)

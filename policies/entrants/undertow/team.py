@@ -1,15 +1,130 @@
-"""The team: who does what in each phase."""
+"""The team: what each boat steers for, phase by phase of a raid, and between raids."""
 
 from __future__ import annotations
+
+import math
+from dataclasses import dataclass
 
 from steerclear.shield.exceptions import PolicyError
 
 from ..catalogue import entrant
-from ..plane import STOP_MPS, Order
+from ..plane import STOP_MPS, Order, ahead, arc, assign, clip, distance, dock, go, heading_to, meeting_point
 from ..play import EntrantTeam
-from ..sight import Sight
-from .aims import aim_of
-from .raid import Raid
+from ..sight import Boat, Point, Sight
+from .raid import BAIT, DRAG, RUN, Chart, Phase, Raid
+
+REACHED_M = 2.0
+"""A bend of a way is reached this near to it, m."""
+COMING_M = 5.0
+"""Opponents up to so far before the dividing line are taken for intruders, m."""
+
+
+@dataclass(frozen=True)
+class Aim:
+    """What a boat steers for.
+
+    Attributes:
+        point: in the own-end frame, m.
+        near_m: it slows down on the last metres and stops so near to the point, m; None: full speed all the way.
+    """
+
+    point: Point
+    near_m: float | None = None
+
+    def order(self, boat: Boat) -> Order:
+        """How a boat steers for it."""
+        if self.near_m is None:
+            return boat.top, heading_to(boat.at, self.point)
+        return go(boat, self.point, self.near_m)
+
+
+def aim_of(raid: Raid, sight: Sight, chart: Chart, number: int) -> Aim:
+    """What an own boat steers for: home with the flag, its part in the raid, or else intruders and its post."""
+    boat = sight.own[number]
+    sails = number == RUN and raid.passage is not None
+    if boat.carries:
+        at = dock(boat, sight) if boat.on_side else None
+        if at is not None:
+            return Aim(at)
+        return Aim(_next_of(raid, boat) if sails else chart.home(boat.at, up=number == RUN))
+    if sails:
+        return Aim(_next_of(raid, boat))
+    if raid.unguarded:
+        return _alone(raid, sight, chart, number)
+    part = _part(raid, sight, chart, number) if raid.phase > Phase.GATHER else None
+    return _guarding(sight, chart, number) if part is None else part
+
+
+def _part(raid: Raid, sight: Sight, chart: Chart, number: int) -> Aim | None:
+    """A boat's part in the raid; None where it has none now."""
+    at, phase = sight.own[number].at, raid.phase
+    if number == BAIT:
+        return None if raid.bait_taken else Aim(chart.bait, 0.5)
+    if number == DRAG:
+        return Aim(chart.posts[DRAG], 2.0) if phase < Phase.DRAG else Aim(chart.drag(at))
+    if number != RUN or any(mate.carries for mate in sight.own):
+        return None
+    if phase == Phase.RUN:
+        return Aim(chart.run(at))
+    return None if sight.taken else Aim(chart.door if phase == Phase.DRAG else chart.posts[RUN], 2.0)
+
+
+def _alone(raid: Raid, sight: Sight, chart: Chart, number: int) -> Aim:
+    """While no opponent stays at home: the third boat waits and sails alone, the others guard."""
+    boat = sight.own[number]
+    if number != RUN or (sight.taken and boat.on_side):
+        return _before_flag(raid, sight, chart)[number]
+    if raid.watch.timed:
+        return Aim(chart.wait(raid.place), 1.5)
+    return Aim(chart.dash(boat)[0]) if raid.phase == Phase.RUN else Aim(chart.edge, 1.5)
+
+
+def _before_flag(raid: Raid, sight: Sight, chart: Chart) -> dict[int, Aim]:
+    """Guards meet who has the flag; else each stands between the flag and another intruder, or sails at it."""
+    run, radius = sight.own[RUN], chart.shape.guard_m
+    if sight.taken:
+        foe = min(sight.foes, key=lambda one: distance(one.at, sight.flag))
+        return {n: Aim(_inside(meeting_point(boat, foe), sight), 2.0) for n, boat in enumerate(sight.own)}
+    guards = [n for n, boat in enumerate(sight.own) if n != RUN and not boat.tagged]
+    comers = [foe.at for foe in sight.foes if not foe.tagged and foe.x < sight.line + COMING_M]
+    comers = sorted(comers, key=lambda at: distance(at, sight.home))[: len(guards)]
+    near_m = distance(run.at, sight.base) - sight.reach
+    at_them = raid.phase == Phase.RUN and (run.carries or near_m < chart.shape.charge_m)
+    places = [_inside(at, sight) if at_them else _towards(sight.home, at, radius) for at in comers]
+    angles = [math.pi * (k + 1) / (len(guards) + 1) for k in range(len(comers), len(guards))]
+    places += [ahead(sight.home, angle, radius) for angle in angles]
+    chosen = assign([sight.own[n].at for n in guards], places)
+    return {n: Aim(places[k], 2.0) for n, k in zip(guards, chosen, strict=True)}
+
+
+def _next_of(raid: Raid, boat: Boat) -> Point:
+    """The first bend of the raid's passage that the boat has not reached yet."""
+    assert raid.passage is not None
+    points = raid.passage.points
+    return next((point for point in points if distance(boat.at, point) > REACHED_M), points[-1])
+
+
+def _towards(a: Point, b: Point, far_m: float) -> Point:
+    """So far from a towards b, m; at b where that is nearer."""
+    return ahead(a, heading_to(a, b), min(far_m, distance(a, b)))
+
+
+def _inside(point: Point, sight: Sight) -> Point:
+    """The nearest point well on the own side."""
+    return clip(point[0], 3.0, sight.line - 1.5), clip(point[1], 3.0, sight.size[1] - 3.0)
+
+
+def _guarding(sight: Sight, chart: Chart, number: int) -> Aim:
+    """The nearest intruder, if no mate is nearer to it; else the post."""
+    boat = sight.own[number]
+    intruders = [foe for foe in sight.foes if not foe.on_side and not foe.tagged]
+    foe = min(intruders, key=lambda one: distance(one.at, boat.at), default=None)
+    met = sight.taken or (foe is not None and distance(boat.at, foe.at) < chart.shape.chase_m)
+    if foe is not None and boat.recharged and boat.on_side and met:
+        nearest = min((mate for mate in sight.own if not mate.tagged), key=lambda mate: distance(mate.at, foe.at))
+        if nearest is boat:
+            return Aim((min(foe.x, sight.line - 2.0), foe.y), 2.0)
+    return Aim(chart.posts[number] if number <= RUN else arc(sight)[number], 2.0)
 
 
 @entrant(
@@ -21,11 +136,7 @@ class Undertow(EntrantTeam):
     name = "undertow"
 
     def begin(self, sight: Sight) -> None:
-        """No raid yet.
-
-        Raises:
-            PolicyError: fewer than three boats.
-        """
+        """No raid yet."""
         if len(sight.own) < 3:
             raise PolicyError(f"entrant {self.name!r} needs three boats, the team has {len(sight.own)}; give it three")
         self._raid = Raid(sight)

@@ -6,7 +6,7 @@ import time
 
 import pytest
 from steerclear import policies
-from steerclear.experiments.entries import process
+from steerclear.experiments.entries import team as process
 from steerclear.experiments.entries.sandbox import Limits, unlimited
 from steerclear.experiments.entries.team import EntryTeam
 from steerclear.shield.exceptions import PolicyError

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from steerclear import policies
 from steerclear.experiments.entries import sandbox
 from steerclear.experiments.entries import team as entry_team
-from steerclear.experiments.entries.answers import Unreadable, from_plain, to_plain
+from steerclear.experiments.entries.child import Unreadable, from_plain, to_plain
 from steerclear.experiments.entries.team import EntryTeam, is_entry, make_team
 from steerclear.experiments.play import match
 from steerclear.experiments.play.match import play_match

@@ -182,13 +182,6 @@ def test_a_report_takes_all_cores_where_nobody_says_how_many(jobs, processes, wr
     assert asked == [processes]
 
 
-def test_a_report_by_no_process_is_refused_before_anything_is_played(write_entry):
-    done = run("report", write_entry("return 4"), "--jobs", "0")
-    assert done.exit_code == ExitCode.BAD_INPUT
-    assert "--jobs must be at least 1" in done.stderr
-    assert not Path("results").exists()
-
-
 def row(game, shielded, captures, against=0, opponents=0, mates=0, counted=0, own="us"):
     hits = {"breaches_opponent_4.0m": opponents, "breaches_teammate_4.0m": mates, "collisions": counted}
     names = {"own": own, "pairing": f"{own} vs <them>", "opponent": "<them>", "game": game, "shielded": shielded}

@@ -8,7 +8,7 @@ from steerclear.env.config import GameConfig
 from steerclear.experiments.cli import app
 from steerclear.experiments.deploy.demo import demo_file
 from steerclear.experiments.policy_checks import words_of_elsewhere
-from steerclear.policies.entrants.learned.entered import FILES
+from steerclear.policies.entrants.learned import FILES
 from steerclear.policies.entrants.learned.sb3_file import add_card
 from steerclear.shield.exceptions import ConfigError, PolicyError
 from typer.testing import CliRunner

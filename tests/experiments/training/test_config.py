@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from steerclear.experiments.training.config import Stage
-from steerclear.experiments.training.config_file import ALGORITHMS, config_of, read_config
+from steerclear.experiments.training.config import OPTIONS, Stage, config_of, read_config
 from steerclear.shield.exceptions import ConfigError
 
 ROOT = Path(__file__).parents[3]
@@ -69,7 +68,7 @@ def test_every_config_of_the_repository_can_be_read(path):
     assert found.algorithm == yaml.safe_load(path.read_text()).get("algorithm", "ppo")
     weights = path.with_suffix(".npz")
     assert not weights.exists() or weights.stat().st_size <= 1_000_000
-    assert config_of(found.model_dump(mode="json")) == found
+    assert config_of(found.told()) == found
 
 
 def test_a_file_that_is_none(tmp_path):
@@ -86,4 +85,4 @@ def test_the_intervention_term_comes_with_its_shield_mode():
 
 
 def test_every_algorithm_has_defaults():
-    assert {config_of({"algorithm": name}).algorithm for name in ALGORITHMS} == set(ALGORITHMS)
+    assert {config_of({"algorithm": name}).algorithm for name in OPTIONS} == set(OPTIONS)

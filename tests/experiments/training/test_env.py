@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from steerclear.experiments.training.config_file import config_of
+from steerclear.experiments.training.config import config_of
 from steerclear.experiments.training.env import AskedShield, TrainEnv
 from steerclear.policies.entrants.learned.network import Features, Network
 from steerclear.shield.exceptions import ConfigError

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from steerclear.experiments.training.config import SELF, League, Stage
-from steerclear.experiments.training.config_file import config_of
+from steerclear.experiments.training.config import SELF, League, Stage, config_of
 from steerclear.experiments.training.env import core_of
 from steerclear.experiments.training.opponents import EachGame, Pool
 from steerclear.policies.entrants.learned.network import Features, Network

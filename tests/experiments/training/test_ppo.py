@@ -6,9 +6,8 @@ import zipfile
 import numpy as np
 import pytest
 from steerclear.experiments.cli import app
-from steerclear.experiments.training.checkpoints import FACTS, newest, read_checkpoint
-from steerclear.experiments.training.config_file import read_config
-from steerclear.experiments.training.ppo import PpoTraining
+from steerclear.experiments.training.config import read_config
+from steerclear.experiments.training.ppo import FACTS, PpoTraining, newest, read_checkpoint
 from steerclear.experiments.training.training import DivergedError
 from steerclear.policies.entrants.learned import read_weights
 from steerclear.shield.exceptions import ConfigError
@@ -68,18 +67,6 @@ def test_a_resumed_training_is_the_same_bit_for_bit(tiny, tmp_path, changes):
     assert changes_of(again.network(), reference.network()) == 0.0
 
 
-def test_a_snapshot_stays_as_the_learner_was_and_equals_its_file(tiny, tmp_path):
-    training = PpoTraining(read_config(tiny(net={"hidden": [16], "roles": "each"})), tmp_path / "run")
-    with pytest.raises(KeyboardInterrupt):
-        training.run(stop_at(108))
-    pool = training.env.batch.opponent.members
-    names = [name for name in pool if name.startswith("self_")]
-    assert names
-    for name in names:
-        assert changes_of(pool[name].network, read_weights(tmp_path / "run" / "snapshots" / f"{name}.npz")) == 0.0
-    assert changes_of(pool[names[0]].network, training.network()) > 0.0
-
-
 def test_the_critic_may_learn_alone_at_first_and_a_resumed_training_knows_how_long(tiny, tmp_path):
     config = tiny(ppo={"steps": 6, "batch": 18, "epochs": 2, "critic_first": 3})
     begun = PpoTraining(read_config(config), tmp_path / "run")
@@ -100,7 +87,7 @@ def test_an_evaluation_that_fails_loses_nothing_and_is_made_up_for(tiny, tmp_pat
 
     config, folder = tiny(evaluation={"every": 100, "games": 2}, decisions=72), tmp_path / "run"
     with monkeypatch.context() as patched:
-        patched.setattr("steerclear.experiments.training.evaluation.play_games", failing)
+        patched.setattr("steerclear.experiments.training.training.play_games", failing)
         with pytest.raises(RuntimeError, match="is gone"):
             trained(config, folder)
     facts, _ = read_checkpoint(newest(folder))

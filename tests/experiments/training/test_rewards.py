@@ -3,7 +3,7 @@
 from types import SimpleNamespace
 
 import numpy as np
-from steerclear.experiments.training.rewards import TERMS, Advance, Denied, Own, Progress
+from steerclear.experiments.training.rewards import TERMS, Advance, Denied, Progress
 from steerclear.shield.platforms.layout import N_STATE, X, Y
 
 NOW = np.ones(1, np.bool_)
@@ -43,7 +43,7 @@ BROUGHT_HOME = [(30, 0, 0, 0), (60, 1, 0, 0), (50, 1, 0, 0), (39, 0, 0, 1), (38,
 
 def test_a_way_that_ends_in_a_tag_earns_nothing():
     assert abs(played(Advance(), game(), TAGGED * 3)) < 1e-12
-    assert played(Own(), game(), TAGGED * 3) == 0.0
+    assert played(TERMS["own"](), game(), TAGGED * 3) == 0.0
     assert played(Progress(), game(), TAGGED) > 0.1
 
 
@@ -53,7 +53,7 @@ def test_a_capture_keeps_what_it_earned():
     assert earned > 0.3
     lost = played_on(term, batch, [(45, 0, 0, 0), (45, 0, 1, 0)])
     assert abs(earned + lost - kept_at_home()) < 1e-9
-    assert played(Own(), game(), BROUGHT_HOME) == 3.0
+    assert played(TERMS["own"](), game(), BROUGHT_HOME) == 3.0
 
 
 def played_on(term, batch, moments):

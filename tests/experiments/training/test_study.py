@@ -5,8 +5,7 @@ import pytest
 from steerclear.experiments.docs import write_pages
 from steerclear.experiments.result_files import write_json
 from steerclear.experiments.runner import RESULTS_FILE
-from steerclear.experiments.training.config import SHIELDS
-from steerclear.experiments.training.config_file import config_of
+from steerclear.experiments.training.config import SHIELDS, config_of
 from steerclear.experiments.training.study import config_of_training, learning_of, run_study, trainings_of
 from steerclear.shield.exceptions import ConfigError
 
@@ -77,7 +76,7 @@ def test_a_folder_of_another_config_is_not_gone_on_with(tmp_path):
     """Its networks would be taken for those of the config given."""
     base, other = (config_of({"decisions": decisions}) for decisions in (100, 200))
     for name in ("results.json", "experiment.json"):  # the second is there from the beginning
-        settings = {"seeds": 1, "games": 1, "training": other.model_dump(mode="json")}
+        settings = {"seeds": 1, "games": 1, "training": other.told()}
         write_json(tmp_path / name, {"command": "train-study", "settings": settings})
         with pytest.raises(ConfigError, match=r"holds a study of another config \(decisions\); give its own, or name"):
             run_study(base, tmp_path, 1, 1, lambda done, of: None)

@@ -3,7 +3,6 @@ import sys
 import zipfile
 from pathlib import Path
 
-import pytest
 from steerclear.experiments import cli_train as train
 from steerclear.experiments.cli import app
 from steerclear.experiments.result_files import lock_folder
@@ -65,17 +64,6 @@ def test_a_training_has_its_folder_alone(tiny, tmp_path, monkeypatch):
     assert held == [2], "the command's own, and this one of the same process"
 
 
-def test_bad_input_is_one_line(tiny, tmp_path):
-    (tmp_path / "bad.yaml").write_text("gamess: 3")
-    result = call("train", tmp_path / "bad.yaml", "--out", tmp_path / "x")
-    assert result.exit_code == 2
-    assert "unknown key 'gamess'" in result.output
-    (tmp_path / "no.zip").write_bytes(b"PK")
-    result = call("export", tmp_path / "no.zip", "--out", tmp_path / "w.npz")
-    assert result.exit_code == 2
-    assert "is not a Stable-Baselines3 model" in result.output
-
-
 def test_a_shield_of_another_step_is_found_before_the_first_rollout(tiny, tmp_path):
     result = call("train", tiny(shield="deployment", shield_settings={"dt_s": 0.7}), "--out", tmp_path / "x")
     assert result.exit_code == 2
@@ -89,8 +77,3 @@ def test_playing_exported_weights_needs_no_torch():
         "assert not any(name.split('.')[0] in ('torch', 'stable_baselines3') for name in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", words], timeout=120, check=False).returncode == 0
-
-
-@pytest.mark.parametrize("command", ["train", "export", "train-study"])
-def test_the_commands_are_there(command):
-    assert call(command, "--help").exit_code == 0

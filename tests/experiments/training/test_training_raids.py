@@ -6,13 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from steerclear.experiments.training.config import Layers, League, Stage
-from steerclear.experiments.training.config_file import config_of, read_config
+from steerclear.experiments.entries.wrap import write_submission
+from steerclear.experiments.training.config import League, Net, Stage, config_of, read_config
 from steerclear.experiments.training.env import core_of
-from steerclear.experiments.training.export import write_submission
 from steerclear.experiments.training.opponents import Pool
-from steerclear.experiments.training.raid_starts import KINDS, PLACE, BeginInRaids, Recorder, StartStates, recorded
-from steerclear.experiments.training.raids_learner import Answer, RaidsLearner
+from steerclear.experiments.training.raids import KINDS, PLACE, Answer, BeginInRaids, RaidsLearner, Recorder, recorded
 from steerclear.experiments.training.training import training_of
 from steerclear.policies import make_batch
 from steerclear.policies.entrants.learned import read_weights
@@ -28,14 +26,13 @@ PLACES = [[38.0, 36.0], [38.0, 4.0], [35.0, 30.0], [20.0, 20.0], [22.0, 20.0], [
 
 def moments_of(core, times_s):
     """Moments of a game whose boats sail circles, one of each kind, after so many seconds."""
-    places, memory = [], []
+    found = []
     for step in range(int(10 * max(times_s)) + 1):
         if step / 10 in times_s:
-            places.append({name: getattr(core.games, name)[0].copy() for name in PLACE})
-            memory.append([Phase.RUN, True, True, False, -12.0, -40.0, False])
+            place = {name: getattr(core.games, name)[0].copy() for name in PLACE}
+            found.append((place, [Phase.RUN, True, True, False, -12.0, -40.0, False], len(found), "medium"))
         core.step(np.tile([1.5, 20.0], (1, core.n_boats, 1)))
-    games = {name: np.array([place[name] for place in places]) for name in PLACE}
-    return StartStates(games, np.array(memory, float), np.arange(4), np.array(["medium"] * 4, object))
+    return found
 
 
 def pool_of(core):
@@ -60,7 +57,7 @@ def test_games_begin_at_moments_of_the_kinds_asked_for_half_of_them_mirrored(som
     assert set(begun.drawn) == {1, 3}
     assert 0.3 < begun.mirrored.mean() < 0.7
     x = core.games.state[:, 0, L.X]
-    np.testing.assert_array_equal(x, some.games["state"][begun.drawn, 0, L.X])
+    np.testing.assert_array_equal(x, [some[k][0]["state"][0, L.X] for k in begun.drawn])
     before = begun.drawn.copy()
     chosen = np.arange(200) < 100
     core.reset(mask=chosen)
@@ -99,9 +96,9 @@ def test_a_recorder_keeps_the_moment_a_raid_begins():
     recorder.advance(np.arange(1))
     found = [(memory[0], KINDS[kind], opponent) for _, memory, kind, opponent in recorder.found]
     assert found == [(Phase.BAIT, "bait", "hold")]
-    assert StartStates.of(recorder.found, [1, 0, 0, 0, 0, 0]).kind.tolist() == [0]
+    assert BeginInRaids(core, recorder.found, [1, 0, 0, 0, 0, 0], 1).moments == recorder.found
     with pytest.raises(ConfigError, match="no raid came to 'drag'"):
-        StartStates.of(recorder.found, [1, 1, 0, 0, 0, 0])
+        BeginInRaids(core, recorder.found, [1, 1, 0, 0, 0, 0], 1)
 
 
 def test_a_boat_that_sails_alone_is_recorded_and_its_games_begin_against_the_same_opponent_and_last(tiny, tmp_path):
@@ -109,9 +106,9 @@ def test_a_boat_that_sails_alone_is_recorded_and_its_games_begin_against_the_sam
     training = training_of(tiny_raids(tiny, **changes), tmp_path / "run", False)
     training.run()
     moments = training._begun.moments
-    of_kind = moments.kind == KINDS.index("alone")
-    assert set(moments.opponent[of_kind]) == {"hard"}
-    assert moments.memory[of_kind][:, -1].all()
+    of_kind = [moment for moment in moments if moment[2] == KINDS.index("alone")]
+    assert {moment[3] for moment in of_kind} == {"hard"}
+    assert all(moment[1][-1] for moment in of_kind)
     assert set(training.pool.playing) == {"hard"}
     assert all(raid.unguarded for raid in training.team.raids)
     assert training.batch.core.time_s.min() > 30.0  # though no raid lasts as long as 40 decisions
@@ -120,7 +117,7 @@ def test_a_boat_that_sails_alone_is_recorded_and_its_games_begin_against_the_sam
 def test_games_that_are_too_short_for_raids_are_one_error():
     config = config_of({"algorithm": "raids", "games": 1, "rules": {"max_time_s": 1.0}})
     with pytest.raises(ConfigError, match="no raid came to 'bait'"):
-        StartStates.of(recorded(config, 0.0, 1), [1] * 6)
+        BeginInRaids(core_of(config, 1, 1), recorded(config, 0.0, 1), [1] * 6, 1)
 
 
 def learner(**ppo):
@@ -196,7 +193,7 @@ def test_a_training_begins_in_raids_and_its_network_plays_and_is_begun_with(tiny
         np.testing.assert_array_equal(one, two)
     with pytest.raises(ConfigError, match="no entry is told"):
         write_submission(network, tmp_path / "solution.zip")
-    wider = begun.model_copy(update={"net": Layers(hidden=(17,))})
+    wider = begun.model_copy(update={"net": Net(hidden=(17,))})
     with pytest.raises(ConfigError, match="start does not fit"):
         training_of(wider, tmp_path / "wider", False)
 

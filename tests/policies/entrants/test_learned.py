@@ -8,8 +8,7 @@ from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
 from steerclear.env.mctf import MctfEnv
 from steerclear.policies.entrants.learned import LearnedBatch, read_weights
-from steerclear.policies.entrants.learned.network import Features, Network
-from steerclear.policies.entrants.learned.weights_file import joined, write_weights
+from steerclear.policies.entrants.learned.network import Features, Network, joined, write_weights
 from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.wrappers import TeamBatch
 

@@ -8,10 +8,8 @@ from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
 from steerclear.env.field import field_geometry
 from steerclear.env.mctf import MctfEnv
-from steerclear.policies.entrants.lucas.home import hints_for, home_of
-from steerclear.policies.evolve import _worth, evolve
-from steerclear.policies.follow import follow_plans
-from steerclear.policies.rollout import N_MOVES, STOP, copy_game, make_desk, roll_out
+from steerclear.policies.entrants.lucas import hints_for, home_of
+from steerclear.policies.evolution import N_MOVES, STOP, copy_game, evolve, follow_plans, make_desk, roll_out, worth_of
 from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.platforms import layout as L
 
@@ -55,11 +53,11 @@ def test_what_a_search_found_is_worth_what_a_whole_rollout_says(config):
         found = evolve(rules, core.games, game, plans, boat, hints, home, rng, desk)
         copy_game(whole.marks, 0, core.games, game)
         roll_out(rules, whole, plans, boat, 0, True)
-        assert found == _worth(rules, whole, boat, home)
+        assert found == worth_of(rules, whole, boat, home)
         others = np.arange(core.n_boats) != boat
         assert (plans[others] == before[others]).all()
         roll_out(rules, whole, before, boat, 0, True)
-        assert found >= _worth(rules, whole, boat, home)
+        assert found >= worth_of(rules, whole, boat, home)
         changed += bool((plans != before).any())
         tagged += int(core.is_tagged.sum())
     assert changed > 5

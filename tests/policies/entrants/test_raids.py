@@ -9,9 +9,8 @@ from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
 from steerclear.env.mctf import MctfEnv
 from steerclear.policies.entrants.learned import RaidsBatch, batch_of
-from steerclear.policies.entrants.learned.network import Features, Network
+from steerclear.policies.entrants.learned.network import Features, Network, read_weights, write_weights
 from steerclear.policies.entrants.learned.raids import SEEN
-from steerclear.policies.entrants.learned.weights_file import read_weights, write_weights
 from steerclear.policies.entrants.undertow.shape import LIMITS, NAMES, SCRIPTED, Shape
 from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.platforms import layout as L

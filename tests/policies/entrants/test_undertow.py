@@ -1,27 +1,40 @@
-"""Undertow: the phases of its raid, its mirrored chart, and a raid in a game."""
+"""Undertow: the phases of its raid, ways past opponents that keep a habit, and flags that it brings home."""
 
+import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
 from steerclear.policies.entrants.sight import look
-from steerclear.policies.entrants.undertow.aims import aim_of
-from steerclear.policies.entrants.undertow.chart import Chart, off
-from steerclear.policies.entrants.undertow.raid import Phase, Raid
+from steerclear.policies.entrants.undertow.habits import LEAD, WARY, Habits, Watch
+from steerclear.policies.entrants.undertow.passage import WAKES_S, Waters, homeward, outward, slack_m
+from steerclear.policies.entrants.undertow.raid import Chart, Phase, Raid, off
 from steerclear.policies.entrants.undertow.shape import SCRIPTED
-from steerclear.policies.entrants.undertow.way import slack_m
+from steerclear.policies.entrants.undertow.team import aim_of
 from steerclear.shield.exceptions import PolicyError
 
 PLACES = [[38.0, 36.0], [38.0, 4.0], [35.0, 30.0], [20.0, 20.0], [22.0, 20.0], [60.0, 20.0]]
+APART = [[20.0, 25.0], [20.0, 15.0], [38.0, 20.0], [75.0, 38.0], [75.0, 2.0], [55.0, 20.0]]
+ROUND_S, FAR_M = 20.0, -1000.0
+
+
+def sight_of(places):
+    env = MctfEnv("aamas2024")
+    env.reset(seed=1, options={"init_dict": {"agent_position": places}})
+    return look(env.core, 0)
 
 
 @pytest.fixture
 def sight():
-    env = MctfEnv("aamas2024")
-    env.reset(seed=1, options={"init_dict": {"agent_position": PLACES}})
-    return look(env.core, 0)
+    return sight_of(PLACES)
+
+
+@pytest.fixture
+def apart():
+    return sight_of(APART)
 
 
 def moved(sight, time_s=0.0, own=None, foes=None):
@@ -82,25 +95,25 @@ def test_no_raid_begins_with_another_opponent_in_the_way_and_the_chart_is_turned
     assert not raid.upper
 
 
-def test_a_chart_is_the_other_one_mirrored(sight):
+def test_a_chart_is_the_other_one_mirrored_and_ways_are_kept_off_at_their_nearest_point(sight):
     up, down = Chart(sight, True), Chart(sight, False)
     for (x, y), (x_down, y_down) in zip(up.posts, down.posts, strict=True):
         assert (x, sight.size[1] - y) == pytest.approx((x_down, y_down))
     assert up.run((50.0, 26.0))[1] + down.run((50.0, 14.0))[1] == pytest.approx(sight.size[1])
-
-
-def test_distance_from_a_way_is_from_its_nearest_point():
     assert off((5.0, 3.0), (0.0, 0.0), (10.0, 0.0)) == pytest.approx(3.0)
     assert off((13.0, 4.0), (0.0, 0.0), (10.0, 0.0)) == pytest.approx(5.0)
 
 
-def test_it_brings_a_flag_home_where_the_guard_is_drawn_away():
+GUARD_AWAY, NOBODY_HOME = [*PLACES[:5], [75.0, 3.0]], [*APART[:2], [38.0, 6.0], [20.0, 38.0], [5.0, 38.0], [12.0, 38.0]]
+
+
+@pytest.mark.parametrize(("places", "phase"), [(GUARD_AWAY, Phase.RUN), (NOBODY_HOME, Phase.GATHER)])
+def test_it_brings_a_flag_home_where_the_guard_is_drawn_away_or_nobody_stays_there(places, phase):
     env = MctfEnv("aamas2024")
-    places = [*PLACES[:5], [75.0, 3.0]]
     observations, infos = env.reset(seed=1, options={"init_dict": {"agent_position": places}})
     team, still = policies.make("undertow"), dict.fromkeys(env.possible_agents[3:], -1)
     team.reset(env, env.possible_agents[:3], 1)
-    team._raid.phase = Phase.RUN
+    team._raid.phase = phase
     while env.core.time_s[0] < 40.0 and not env.core.captures[0, 0]:
         observations, _, _, _, infos = env.step(team.act(observations, infos) | still)
     assert env.core.captures[0].tolist() == [1, 0]
@@ -191,29 +204,207 @@ def test_all_meet_who_has_the_own_flag(sight):
     assert all(aim_of(raid, taken, chart, number).point[1] > 36.0 for number in range(3))
 
 
-def test_it_brings_a_flag_home_while_nobody_stays_there():
-    env = MctfEnv("aamas2024")
-    places = [[20.0, 25.0], [20.0, 15.0], [38.0, 6.0], [20.0, 38.0], [5.0, 38.0], [12.0, 38.0]]
-    observations, infos = env.reset(seed=1, options={"init_dict": {"agent_position": places}})
-    team, still = policies.make("undertow"), dict.fromkeys(env.possible_agents[3:], -1)
-    team.reset(env, env.possible_agents[:3], 1)
-    while env.core.time_s[0] < 40.0 and not env.core.captures[0, 0]:
-        observations, _, _, _, infos = env.step(team.act(observations, infos) | still)
-    assert env.core.captures[0].tolist() == [1, 0]
-
-
-@pytest.mark.parametrize(("preset", "factor"), [("aamas2024", 1.0), ("mctf2025", 2.0)])
-def test_distances_of_a_raid_grow_with_the_field_and_times_do_not(preset, factor):
-    env = MctfEnv(preset)
+def test_distances_of_a_raid_grow_with_the_field_times_do_not_and_it_needs_three_boats():
+    env = MctfEnv("mctf2025")
     env.reset(seed=1)
     shape = Raid(look(env.core, 0)).shape
-    assert shape.guard_m == factor * SCRIPTED.guard_m
-    assert shape.free_m == factor * SCRIPTED.free_m
+    assert (shape.guard_m, shape.free_m) == (2.0 * SCRIPTED.guard_m, 2.0 * SCRIPTED.free_m)
     assert shape.baited_s == SCRIPTED.baited_s
-
-
-def test_fewer_than_three_boats_are_refused():
     env = MctfEnv(GameConfig.preset("aamas2024", team_size=2))
     env.reset(seed=1)
     with pytest.raises(PolicyError, match="needs three boats"):
         policies.make("undertow").reset(env, env.possible_agents[:2], 0)
+
+
+def circling(time_s):
+    """Where a boat is that circles once in `ROUND_S`."""
+    angle = 2.0 * math.pi * time_s / ROUND_S
+    return {"x": 60.0 + 5.0 * math.cos(angle), "y": 20.0 - 5.0 * math.sin(angle), "heading": angle + math.pi}
+
+
+def watched(sight, seconds, place=circling, begin_s=0, habits=None):
+    """Habits of opponents of which the third does as it is told."""
+    habits = habits or Habits(3)
+    for second in range(begin_s, begin_s + seconds):
+        assert habits.look(moved(sight, float(second), foes={2: {"on_side": True, "tagged": False, **place(second)}}))
+    return habits
+
+
+def test_who_circles_is_expected_to_go_on_circling_after_the_first_round_looked_at_once_a_second(sight):
+    habits = watched(sight, int(ROUND_S) + LEAD)
+    assert not habits.look(moved(sight, ROUND_S + LEAD - 0.1))
+    assert not habits.settled(2)
+    assert habits.track(2, 10) is None
+    habits = watched(sight, 60)
+    assert habits.settled(2)
+    track = habits.track(2, 70)
+    expected = [(circling(60 + k)["x"], circling(60 + k)["y"]) for k in range(70)]
+    np.testing.assert_allclose(track[:, :2], expected, atol=1e-6)
+    assert track[:, 2].all()
+
+
+def test_who_leaves_its_circle_is_not_relied_on_for_long(sight):
+    habits = watched(sight, 60)
+    watched(sight, 5, lambda second: {"x": 60.0 - 2.0 * (second - 60), "y": 20.0, "heading": 0.0}, 60, habits)
+    assert not habits.settled(2)
+    watched(sight, 4 * WARY, begin_s=65, habits=habits)
+    assert not habits.settled(2)
+    watched(sight, 12 * WARY, begin_s=65 + 4 * WARY, habits=habits)
+    assert habits.settled(2)
+
+
+def test_a_tagged_boat_is_likened_to_tagged_ones_and_cannot_tag(sight):
+    def place(second):
+        phase = second % 14
+        return {"x": 45.0 + 2.0 * min(phase, 14 - phase), "y": 20.0, "heading": math.pi / 2.0, "tagged": phase < 7}
+
+    habits = watched(sight, 60, place)
+    assert habits.track(2, 20)[:, 2].tolist() == [1.0 - place(60 + k)["tagged"] for k in range(20)]
+
+
+class Known:
+    """Habits that are what a test says: number to track."""
+
+    def __init__(self, tracks):
+        self._tracks = tracks
+
+    def track(self, number, looks):
+        return self._tracks.get(number)
+
+
+def standing(x, y, may_tag=1.0):
+    """The track of a boat that stays where it is."""
+    return np.tile([x, y, may_tag], (90, 1))
+
+
+def sailed(boat, points, step_m=0.25):
+    """Points of a way and when a boat is there, s."""
+    legs = list(zip((boat.at, *points[:-1]), points, strict=True))
+    places = np.concatenate([np.linspace(a, b, max(int(math.dist(a, b) / step_m), 2))[1:] for a, b in legs])
+    return places, np.cumsum(np.hypot(*np.diff(places, axis=0, prepend=[boat.at]).T)) / boat.top
+
+
+def test_a_way_leads_round_who_stands_and_to_the_flag(apart):
+    waters = Waters(apart, Known({2: standing(52.0, 14.0)}), 2.0, FAR_M)
+    found = outward(waters, apart.own[2])
+    places, _ = sailed(apart.own[2], found.points)
+    off_m = np.hypot(places[:, 0] - 52.0, places[:, 1] - 14.0)[places[:, 0] > apart.line]
+    assert found.room_m > 0.0
+    assert off_m.min() >= apart.reach + 2.0
+    assert math.dist(found.points[-1], apart.goal) < apart.reach
+
+
+def test_the_way_home_is_thought_of_before_a_boat_sets_out(apart):
+    """From 12 s on another opponent keeps the line: out is free, home is not."""
+    late = np.concatenate([standing(52.0, 20.0, 0.0)[:12], np.tile([43.0, 20.0, 1.0], (78, 1))])
+    wall = {n: np.where([[True, False, True]], late, y) for n, y in enumerate((8.0, 20.0, 32.0))}
+    assert outward(Waters(apart, Known(wall), 0.0, FAR_M), apart.own[2]).room_m < 0.0
+    open_to_all = {n: standing(43.0, 20.0, 0.0) for n in range(3)}
+    assert outward(Waters(apart, Known(open_to_all), 0.0, FAR_M), apart.own[2]).room_m == math.inf
+
+
+def test_a_patrol_is_passed_while_it_is_elsewhere(apart):
+    """It is in the way for 10 s and then not; whoever waits finds the way that was shut."""
+    comes, goes = standing(52.0, 20.0), standing(52.0, 20.0)
+    comes[10:], goes[:10] = [75.0, 20.0, 0.0], [75.0, 20.0, 0.0]
+    points = np.linspace((41.0, 20.0), (63.0, 20.0), 40)[None]
+    times_s = np.linspace(1.0, 12.0, 40)[None]
+    rooms = [
+        float(Waters(apart, Known({2: track}), 0.0, FAR_M).room_m(points, times_s + after_s, np.array([12.0]))[0])
+        for track, after_s in ((comes, 0.0), (comes, 15.0), (goes, 0.0))
+    ]
+    assert rooms[0] < 0.0 < rooms[1]
+    assert rooms[2] < 0.0
+
+
+def test_who_keeps_no_habit_is_held_to_cut_the_boat_off(apart):
+    boat, grab, home = apart.own[2], (61.0, 20.0), (39.0, 20.0)
+    points, times_s = sailed(boat, (grab, home))
+    grabs_s = math.dist(boat.at, grab) / boat.top
+    room = Waters(apart, Known({}), 0.0, 0.0).room_m(points[None], times_s[None], np.array([grabs_s]))
+    assert room[0] == pytest.approx(slack_m(apart, boat, grab, home), abs=1.0)
+
+
+def test_a_tagged_boat_that_is_soon_free_is_kept_clear_of(apart):
+    tagged = moved(apart, 0.0, foes={2: {"tagged": True, "x": 50.0, "y": 20.0}})
+    at, free_s = (60.0, 20.0), 5.0  # it is free again where its base is in reach
+    waters = Waters(tagged, Known({0: standing(75.0, 38.0), 1: standing(75.0, 2.0)}), 1.0, FAR_M)
+    for after_s, near in ((free_s, True), (free_s + 1.5 * WAKES_S, False)):
+        room = waters.room_m(np.array([[(at[0], at[1] + 8.0)]]), np.array([[after_s]]), np.array([99.0]))[0]
+        assert room == pytest.approx(8.0 - apart.reach - 1.0) if near else room > 0.0
+
+
+def test_home_is_over_the_line_by_the_freest_way(apart):
+    boat = moved(apart, 0.0, {2: {"x": 66.0, "y": 12.0, "carries": True, "on_side": False}}).own[2]
+    found = homeward(Waters(apart, Known({2: standing(52.0, 22.0)}), 2.0, FAR_M), boat)
+    assert found.room_m > 0.0
+    assert found.points[-1][0] < apart.line
+    assert found.points[-1][1] < 12.0
+
+
+@pytest.mark.parametrize(("lure_x", "unguarded"), [(30.0, True), (41.0, False)])
+def test_who_is_up_at_the_line_with_nobody_to_chase_is_no_guard(apart, lure_x, unguarded):
+    up = {number: {"x": 46.0} for number in range(3)}
+    watch = Watch(apart)
+    for second in range(20):
+        watch.look(moved(apart, float(second), {0: {"x": lure_x}, 2: {"x": 30.0}}, up))
+    assert watch.unguarded == unguarded
+
+
+def raid_with(sight, tracks):
+    """A raid in which opponents with tracks keep a habit, and the others have left."""
+    raid = Raid(sight)
+    raid.watch.habits.settled = lambda number: number in tracks
+    raid.watch.habits.track = lambda number, looks: tracks.get(number)
+    raid.watch._left = {0, 1, 2} - set(tracks)
+    return raid
+
+
+def test_the_third_boat_sails_the_passage_and_the_others_guard(apart):
+    raid = raid_with(apart, {n: standing(75.0, y) for n, y in enumerate((38.0, 2.0, 20.0))})
+    raid.watch.habits.track = lambda number, looks: standing(75.0, 38.0 if number else 2.0, 0.0)
+    chart = raid.advance(apart)
+    assert raid.unguarded
+    assert raid.phase == Phase.RUN
+    assert aim_of(raid, apart, chart, 2).point == raid.passage.points[0]
+    assert all(aim_of(raid, apart, chart, number).point[0] < apart.line for number in (0, 1))
+    raid.advance(moved(apart, 1.0, {2: {"tagged": True}}))
+    assert raid.phase == Phase.GATHER
+    assert raid.passage is None
+
+
+def test_without_a_passage_it_waits_in_turn_at_both_edges(apart):
+    raid = raid_with(apart, {n: standing(46.0, y) for n, y in enumerate((8.0, 20.0, 32.0))})
+    waits = []
+    for second in range(90):
+        now = moved(apart, float(second))
+        waits.append(aim_of(raid, now, raid.advance(now), 2).point)
+    assert raid.phase == Phase.GATHER
+    assert {round(y / apart.size[1], 2) for _, y in waits} == {0.15, 0.5, 0.85}
+    assert {x for x, _ in waits} == {apart.line - 2.0}
+
+
+def test_a_second_raid_goes_on_after_the_first_brought_a_flag_home(apart):
+    """What was held in a passage before does not end the next one."""
+    raid = raid_with(apart, {n: standing(75.0, 38.0, 0.0) for n in range(3)})
+    raid.advance(apart)
+    raid.advance(moved(apart, 10.0, {2: {"x": 60.0, "carries": True, "on_side": False}}))
+    assert raid.held
+    raid.advance(moved(apart, 20.0, {2: {"x": 39.0}}))
+    raid.advance(moved(apart, 21.0))
+    assert raid.phase == Phase.RUN
+    raid.advance(moved(apart, 21.1, {2: {"x": 41.0, "on_side": False}}))
+    assert raid.phase == Phase.RUN
+
+
+def test_it_brings_a_flag_home_from_easy_with_a_patrol_before_it_whose_habit_it_learns():
+    env = MctfEnv(GameConfig.preset("aamas2024", default_start=False), action_kind="continuous")
+    observations, infos = env.reset(seed=2)
+    teams = [policies.make("easy"), policies.make("undertow")]
+    for number, team in enumerate(teams):
+        team.reset(env, env.possible_agents[3 * number : 3 * number + 3], 1)
+    while env.core.time_s[0] < 200.0 and not env.core.captures[0].any():
+        actions = teams[0].act(observations, infos) | teams[1].act(observations, infos)
+        observations, _, _, _, infos = env.step(actions)
+    assert env.core.captures[0].tolist() == [0, 1]
+    assert any(teams[1]._raid.watch.habits.settled(number) for number in range(3))

@@ -8,11 +8,7 @@ from steerclear.shield.exceptions import ConfigError
 
 
 def address_of(barrier: Any) -> int:
-    """Refuse it.
-
-    Raises:
-        ConfigError: always.
-    """
+    """Refuse it."""
     raise ConfigError(f"a shielded zip cannot carry barrier {barrier!r}; leave it out of the shield's settings")
 
 

@@ -23,11 +23,7 @@ with reference_models():  # those who packed them have tried them
 
 
 def get_platform(name: str | Platform) -> Platform:
-    """The platform of that name; a `Platform` passes through.
-
-    Raises:
-        PlatformError: no platform has that name.
-    """
+    """The platform of that name; a `Platform` passes through."""
     if isinstance(name, Platform):
         return name
     if name not in PLATFORMS:
@@ -41,9 +37,5 @@ def known_platforms() -> dict[str, Platform]:
 
 
 def register_platform(platform: Any) -> Any:
-    """Refuse it: what is packed is what the zip was made for.
-
-    Raises:
-        PlatformError: always.
-    """
+    """Refuse it: what is packed is what the zip was made for."""
     raise PlatformError("a shielded zip knows the boats it was packed with; wrap the entry anew with other ones")

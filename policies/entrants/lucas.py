@@ -1,31 +1,41 @@
-"""The team in every game of a batch: at every macro-action one boat's plan is evolved, own and opposing in turn."""
+"""Lucas-QMU: rolling-horizon evolution for many boats.
+
+The paper: action sequences of macro-actions are evolved in a forward model (rolling-horizon evolution: Gaina, Devlin,
+Lucas and Perez-Liebana 2020, arXiv 2003.12331), for one boat at a time, own and opposing players in alternation
+(co-evolution: Liu, Perez-Liebana and Lucas 2016, arXiv 1607.01730), with a shift buffer; rules made for the score
+refine the plan. Filled in: the forward model is the batched simulator itself; macro-actions are eight headings at full
+speed and a stop, held for `MOVE_S`; mutation, fitness weights and the rules are ours. The fitness counts captures,
+grabs, tags, progress, boats gone out of bounds, and contacts with teammates and opponents.
+"""
 
 from __future__ import annotations
 
+import math
 import time
 
 import numpy as np
 from steerclear.env.arrays import make_rules
-from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
 from steerclear.env.field import field_geometry
 from steerclear.shield.exceptions import PolicyError
-from steerclear.shield.jit import Array, BoolArray
+from steerclear.shield.jit import Array, BoolArray, IntArray
+from steerclear.shield.platforms import layout as L
 
-from ...evolve import evolve
-from ...follow import follow_plans
-from ...rollout import STOP, make_desk
-from .home import hints_for, home_of
+from ..evolution import HEADINGS, STOP, evolve, follow_plans, make_desk
+from .catalogue import entrant
+from .play import BatchFront
+from .sight import docks_of
 
 MOVE_S = 1.2
 HORIZON = 15
 POPULATION, GENERATIONS = 15, 4
 STEP_S = 0.2
-"""Step of the forward model, s: twice the game's, which costs a tenth of a metre over a plan and halves the time."""
+"""Step of the forward model, s: twice the game's, which costs a tenth of a metre over a plan and halves the time.
+Decisions of several steps are played as they are, their headings held."""
 
 
 class LucasBatch:
-    """A `BatchPolicy` that searches with the simulator, in one game after another.
+    """A `BatchPolicy` that searches with the simulator, in one game after another: at every macro-action for one boat.
 
     Args:
         population: plans of a generation.
@@ -52,13 +62,14 @@ class LucasBatch:
 
     def reset(self, core: BatchedMctf, team: int, seed: int) -> None:
         """Begin all games, with plans that stop."""
-        model = _forward_model(core.config)
+        rules = core.config
+        model = rules.replace(dt_s=rules.dt_s if rules.decision_steps > 1 else max(STEP_S, rules.dt_s))
         self._rules = make_rules(model, field_geometry(model))
         self._desk = make_desk(model, self._population, self._generations, self._horizon, MOVE_S)
         self._team, self._own = team, np.flatnonzero(core.team == team)
         others = np.flatnonzero(core.team != team)
         self._turns = [int(boat) for pair in zip(self._own, others, strict=True) for boat in pair]
-        self._every = max(round(MOVE_S / core.config.decision_s), 1)
+        self._every = max(round(MOVE_S / rules.decision_s), 1)
         games = core.n_games
         self._plans = np.full((games, core.n_boats, self._horizon), STOP, dtype=np.int64)
         self._age = np.zeros(games, np.int64)
@@ -79,11 +90,7 @@ class LucasBatch:
             self._rngs[int(game)] = np.random.default_rng([(int(seed) + int(game)) & 0x7FFFFFFF, 0x10CA5])
 
     def act(self, core: BatchedMctf, team: int) -> Array:
-        """Commands (B, n_team, 2), speed m/s and relative heading deg; the array is reused by the next call.
-
-        Raises:
-            PolicyError: `reset` was not called for this team and number of games.
-        """
+        """Commands (B, n_team, 2), speed m/s and relative heading deg; the array is reused by the next call."""
         if team != self._team or core.n_games != self._mine.size:
             raise PolicyError(f"policy {self.name!r} was not reset for team {team} of these games; call reset first")
         for game in np.flatnonzero(self._mine & (self._age % self._every == 0)):
@@ -105,6 +112,38 @@ class LucasBatch:
         self.think_times_s.append((time.perf_counter() - begun) / len(boats))
 
 
-def _forward_model(config: GameConfig) -> GameConfig:
-    """The rules that are searched in; decisions of several steps are played as they are, their headings held."""
-    return config.replace(dt_s=config.dt_s if config.decision_steps > 1 else max(STEP_S, config.dt_s))
+def home_of(core: BatchedMctf, team: int, boat: int, game: int = 0) -> Array:
+    """Where a boat takes the flag, m: the nearest dock from where it is now, else the base."""
+    docks = np.array(docks_of(core, team)).reshape(-1, 2)
+    if not len(docks):
+        return np.asarray(core.flag_home[team])
+    place = core.state[game, boat, [L.X, L.Y]]
+    return np.asarray(docks[int(np.linalg.norm(docks - place, axis=1).argmin())])
+
+
+def hints_for(core: BatchedMctf, boat: int, home: Array, game: int = 0) -> IntArray:
+    """Macro-actions that are worth a try at once: straight to the other flag, straight home, and a stop."""
+    place, goal = core.state[game, boat, :2], core.flag_position[game, 1 - int(core.team[boat])]
+    headings = [math.degrees(math.atan2(aim[0] - place[0], aim[1] - place[1])) for aim in (goal, home)]
+    return np.array([*(round(heading / 45.0) % HEADINGS for heading in headings), STOP], dtype=np.int64)
+
+
+@entrant(
+    "lucas",
+    "rolling-horizon evolution of macro-actions in the simulator, boat by boat (Lucas-QMU)",
+    "Lucas-QMU",
+    batch=LucasBatch,
+)
+class Lucas(BatchFront):
+    """Searches with the simulator: a thin front over `LucasBatch`, whose arguments it takes."""
+
+    name = "lucas"
+
+    def __init__(self, population: int = POPULATION, generations: int = GENERATIONS, horizon: int = HORIZON) -> None:
+        super().__init__()
+        self._batch = LucasBatch(population, generations, horizon)
+
+    @property
+    def think_times_s(self) -> list[float]:
+        """Times of the searches for one boat so far."""
+        return self._batch.think_times_s

@@ -1,4 +1,4 @@
-"""Rolling plans out in the simulator, compiled, for a search that changes one boat's plan at a time.
+"""Rolling-horizon evolution of one boat's plan by rollouts in the simulator, and sailing plans in live games; compiled.
 
 Plans are rolled out one after another. A mutant begins where it first differs from its parent, and boats other than its
 own go as they did in the parent's rollout for as long as they stand as they did there (tagged or not, their flag taken
@@ -19,39 +19,29 @@ from steerclear.env.arrays import CAPTURE, GRAB, OUT, TAG, Games, Rules, make_ga
 from steerclear.env.config import GameConfig
 from steerclear.env.drive_home import decide_boat
 from steerclear.env.motion import move_boat
-from steerclear.shield.jit import Array, BoolArray, IntArray, copy_row, lean_kernel
+from steerclear.shield.jit import Array, BoolArray, IntArray, copy_row, kernel, lean_kernel
 from steerclear.shield.platforms import layout as L
+from steerclear.shield.platforms.usv import wrap_degrees
 from steerclear.shield.shared import share
 
 HEADINGS = 8
 STOP = HEADINGS
 N_MOVES = HEADINGS + 1
 """Macro-actions: full speed along one of eight absolute headings (45 deg apart, from north), and a stop."""
+MUTATED = 3.0
+"""Macro-actions of a plan that a mutation changes, on average, beside the first."""
 
 # columns of what a rollout counts, blue's minus red's where two teams can have it
 CAPTURES, GRABS, TAGS, MATE_HITS_BLUE, MATE_HITS_RED, FOE_HITS, NEAR_BLUE, NEAR_RED = 0, 1, 2, 3, 4, 5, 6, 7
 OUT_BLUE, OUT_RED = 8, 9
 N_COUNTED = 10
+PRICES = (10.0, 3.0, 2.0, 6.0, 0.05, 3.0, 4.0, 2.0)
+"""What a plan is worth to a team: a capture, grab and tag, less a hit with a mate, a near mate, a hit with a foe and a
+boat gone out; and a field width of progress. The paper's played for captures, progress and contacts of teammates."""
 NEAR_MATES_M = 6.0
 """Closer than this, teammates are counted as near, decision by decision."""
-SLACK_M = 0.001
-"""Pairs this much farther apart than what is looked for are not measured to the last bit."""
-
-
-class Weights(NamedTuple):
-    """What a plan is worth, to one team; distances count per field width.
-
-    The paper's team played for captures, progress and contacts of teammates; its row has the fewest collisions.
-    """
-
-    capture: float = 10.0
-    grab: float = 3.0
-    tag: float = 2.0
-    mate_hit: float = 6.0
-    foe_hit: float = 3.0
-    near_mate: float = 0.05
-    out: float = 4.0
-    progress: float = 2.0
+KEEP_OFF_M = 5.0
+"""In live games a boat nearer than this to another, and not past it, turns away from it."""
 
 
 class Desk(NamedTuple):
@@ -63,7 +53,6 @@ class Desk(NamedTuple):
 
     repeats: int
     generations: int
-    weights: Weights
     bench: Games  # one game
     marks: Games  # H games: the best plan's as each macro-action begins
     marked: Array  # (H, N_COUNTED) what had been counted by then
@@ -92,26 +81,126 @@ def make_desk(config: GameConfig, population: int, generations: int, horizon: in
     n, repeats = config.n_boats, max(round(move_s / config.decision_s), 1)
     decisions = horizon * repeats
     steps = decisions * config.decision_steps
-    return share(
-        Desk(
-            repeats=repeats,
-            generations=generations,
-            weights=Weights(),
-            bench=make_games(config, 1),
-            marks=make_games(config, horizon),
-            marked=np.zeros((horizon, N_COUNTED)),
-            state=np.zeros((steps, n, L.N_STATE)),
-            error_is_float32=np.zeros((steps, n), np.bool_),
-            on_side=np.zeros((steps, n), np.bool_),
-            is_tagged=np.zeros((decisions, n), np.bool_),
-            flag_taken=np.zeros((decisions, 2), np.bool_),
-            as_recorded=np.zeros(n, np.bool_),
-            counted=np.zeros(N_COUNTED),
-            wanted=np.zeros((1, n, 2)),
-            commands=np.zeros((1, n, 2)),
-            brood=np.zeros((population, horizon), np.int64),
-        )
+    desk = Desk(
+        repeats=repeats,
+        generations=generations,
+        bench=make_games(config, 1),
+        marks=make_games(config, horizon),
+        marked=np.zeros((horizon, N_COUNTED)),
+        state=np.zeros((steps, n, L.N_STATE)),
+        error_is_float32=np.zeros((steps, n), np.bool_),
+        on_side=np.zeros((steps, n), np.bool_),
+        is_tagged=np.zeros((decisions, n), np.bool_),
+        flag_taken=np.zeros((decisions, 2), np.bool_),
+        as_recorded=np.zeros(n, np.bool_),
+        counted=np.zeros(N_COUNTED),
+        wanted=np.zeros((1, n, 2)),
+        commands=np.zeros((1, n, 2)),
+        brood=np.zeros((population, horizon), np.int64),
     )
+    return share(desk)
+
+
+@kernel
+def evolve(
+    rules: Rules,
+    games: Games,
+    b: int,
+    plans: IntArray,
+    boat: int,
+    hints: IntArray,
+    home: Array,
+    rng: np.random.Generator,
+    desk: Desk,
+) -> float:
+    """Improve one boat's plan while all others keep theirs; return what the best found is worth to its team.
+
+    Args:
+        rules: of the forward model.
+        games: the live games.
+        b: the one that is searched in.
+        plans: (n, H) macro-actions of all boats, 0..8; the boat's row is replaced by the best found.
+        boat: whose plan.
+        hints: (k,) macro-actions to try held throughout, such as straight to the flag.
+        home: (2,) where the boat takes the flag, m.
+        rng: of mutations.
+        desk: where to work.
+    """
+    copy_game(desk.marks, 0, games, b)
+    for k in range(N_COUNTED):
+        desk.marked[0, k] = 0.0
+    own, brood = plans[boat], desk.brood
+    population, horizon = brood.shape
+    roll_out(rules, desk, plans, boat, 0, True)
+    worth = worth_of(rules, desk, boat, home)
+    for generation in range(desk.generations):
+        _mutate(rng, own, brood)
+        if generation == 0:
+            for k in range(min(hints.size, population - 1)):
+                brood[1 + k, :] = hints[k]
+        best, first = 0, horizon
+        for k in range(1, population):
+            begin = _first_difference(brood[k], own)
+            if begin == horizon:
+                continue
+            _copy_plan(own, brood[k])
+            roll_out(rules, desk, plans, boat, begin, False)
+            _copy_plan(own, brood[0])
+            found = worth_of(rules, desk, boat, home)
+            if found > worth:
+                worth, best, first = found, k, begin
+        if best > 0:
+            _copy_plan(own, brood[best])
+            if generation + 1 < desk.generations:
+                roll_out(rules, desk, plans, boat, first, True)
+    return worth
+
+
+@kernel
+def _mutate(rng: np.random.Generator, parent: IntArray, brood: IntArray) -> None:
+    """Fill a brood (P, H) with the parent, and mutants of it: a stretch of a plan is replaced by one macro-action."""
+    horizon = parent.size
+    for k in range(brood.shape[0]):
+        _copy_plan(brood[k], parent)
+        if k > 0:
+            begin = int(rng.integers(0, horizon))
+            end = begin + 1 + int(rng.poisson(MUTATED))
+            move = int(rng.integers(0, N_MOVES))
+            for m in range(begin, min(end, horizon)):
+                brood[k, m] = move
+
+
+@lean_kernel
+def _copy_plan(to: IntArray, source: IntArray) -> None:
+    """Copy a plan's macro-actions."""
+    for m in range(source.shape[0]):
+        to[m] = source[m]
+
+
+@lean_kernel
+def _first_difference(plan: IntArray, other: IntArray) -> int:
+    """The first macro-action in which plans differ; their length where none does."""
+    m = 0
+    while m < plan.shape[0] and plan[m] == other[m]:
+        m += 1
+    return m
+
+
+@lean_kernel
+def worth_of(rules: Rules, desk: Desk, boat: int, home: Array) -> float:
+    """What the plans just rolled out are worth to a boat's team, see `PRICES`.
+
+    Progress is how near the boat is to what it is after, 1 at it: the flag, or with it (or tagged) its home.
+    """
+    c, team, games = desk.counted, rules.team[boat], desk.bench
+    capture, grab, tag, mate_hit, near_mate, foe_hit, out, progress = PRICES
+    sign = 1.0 if team == 0 else -1.0
+    events = sign * (capture * c[CAPTURES] + grab * c[GRABS] + tag * c[TAGS])
+    costs = mate_hit * c[MATE_HITS_BLUE + team] + near_mate * c[NEAR_BLUE + team]
+    costs = costs + foe_hit * c[FOE_HITS] + out * c[OUT_BLUE + team]
+    aim = home if games.has_flag[0, boat] or games.is_tagged[0, boat] else games.flag_position[0, 1 - team]
+    dx, dy = games.state[0, boat, L.X] - aim[0], games.state[0, boat, L.Y] - aim[1]
+    return events - costs + progress * (1.0 - math.sqrt(dx * dx + dy * dy) / rules.size[0])
 
 
 @lean_kernel
@@ -140,21 +229,27 @@ def roll_out(rules: Rules, desk: Desk, plans: IntArray, boat: int, begin: int, r
     """Play plans (n, H) on the bench from the mark of macro-action ``begin`` to their end, and count what happens.
 
     With ``record`` all boats are moved, and how it goes is kept. Else those but ``boat`` go as recorded while they can.
+    Events of later decisions count less than early ones.
     """
-    games, horizon = desk.bench, plans.shape[1]
+    games, horizon, c = desk.bench, plans.shape[1], desk.counted
     copy_game(games, 0, desk.marks, begin)
-    copy_row(desk.counted, desk.marked[begin])
+    copy_row(c, desk.marked[begin])
     for i in range(rules.n_boats):
         desk.as_recorded[i] = not record and i != boat and rules.obstacles.bounds.shape[0] == 0
     for move in range(begin, horizon):
         if record and move > begin:
             copy_game(desk.marks, move, games, 0)
-            copy_row(desk.marked[move], desk.counted)
+            copy_row(desk.marked[move], c)
         early = 1.0 - 0.5 * move / horizon
         for repeat in range(desk.repeats):
             _play_decision(rules, desk, plans, move, move * desk.repeats + repeat, record)
-            _count_events(games.events[0], early, desk.counted)
-            _count_pairs(rules, games.state[0], games.touching[0], desk.counted)
+            events = games.events[0]
+            c[CAPTURES] += early * (events[0, CAPTURE] - events[1, CAPTURE])
+            c[GRABS] += early * (events[0, GRAB] - events[1, GRAB])
+            c[TAGS] += early * (events[0, TAG] - events[1, TAG])
+            c[OUT_BLUE] += events[0, OUT]
+            c[OUT_RED] += events[1, OUT]
+            _count_pairs(rules, games.state[0], games.touching[0], c)
 
 
 @lean_kernel
@@ -223,34 +318,57 @@ def _sail(rules: Rules, desk: Desk, action: int, i: int, first: int, record: boo
 
 
 @lean_kernel
-def _count_events(events: IntArray, early: float, counted: Array) -> None:
-    """Count a decision's events (2, 4), a later one less than an early one."""
-    counted[CAPTURES] += early * (events[0, CAPTURE] - events[1, CAPTURE])
-    counted[GRABS] += early * (events[0, GRAB] - events[1, GRAB])
-    counted[TAGS] += early * (events[0, TAG] - events[1, TAG])
-    counted[OUT_BLUE] += events[0, OUT]
-    counted[OUT_RED] += events[1, OUT]
-
-
-@lean_kernel
 def _count_pairs(rules: Rules, state: Array, touching: BoolArray, counted: Array) -> None:
     """Count contacts that are new and teammates that are near; ``touching`` (n, n) is brought up to date."""
     for i in range(rules.n_boats):
         for j in range(i + 1, rules.n_boats):
-            mates = rules.team[i] == rules.team[j]
-            contact_m = rules.agent_radius[i] + rules.agent_radius[j]
             dx, dy = state[j, L.X] - state[i, L.X], state[j, L.Y] - state[i, L.Y]
-            looked_for_m = (max(contact_m, NEAR_MATES_M) if mates else contact_m) + SLACK_M
-            squared = dx * dx + dy * dy
-            if squared > looked_for_m * looked_for_m:
-                touching[i, j] = False
-                continue
-            gap = math.sqrt(squared)
-            fresh = gap <= contact_m and not touching[i, j]
-            touching[i, j] = gap <= contact_m
-            if not mates:
+            gap = math.sqrt(dx * dx + dy * dy)
+            contact = gap <= rules.agent_radius[i] + rules.agent_radius[j]
+            fresh, touching[i, j] = contact and not touching[i, j], contact
+            if rules.team[i] != rules.team[j]:
                 counted[FOE_HITS] += fresh
                 continue
             counted[MATE_HITS_BLUE + rules.team[i]] += fresh
             if gap < NEAR_MATES_M:
                 counted[NEAR_BLUE + rules.team[i]] += (NEAR_MATES_M - gap) / NEAR_MATES_M
+
+
+@lean_kernel
+def follow_plans(rules: Rules, games: Games, plans: IntArray, own: IntArray, out: Array) -> None:
+    """Commands of a team's boats for this step of live games; a boat too near to another turns away from it.
+
+    Args:
+        rules: of the games.
+        games: B games.
+        plans: (B, n, H) macro-actions of all boats; the first is the one to follow.
+        own: (k,) numbers of the team's boats.
+        out: (B, k, 2), written: speed m/s, relative heading deg.
+    """
+    for b in range(plans.shape[0]):
+        state = games.state[b]
+        for k in range(own.size):
+            i = own[k]
+            near = _too_near(state, i)
+            action = plans[b, i, 0]
+            heading = 45.0 * action
+            if near >= 0:
+                away_x, away_y = state[i, L.X] - state[near, L.X], state[i, L.Y] - state[near, L.Y]
+                heading = math.degrees(math.atan2(away_x, away_y))
+            stops = near < 0 and action == STOP
+            out[b, k, 0] = 0.0 if stops else rules.max_speed[i]
+            out[b, k, 1] = 0.0 if stops else wrap_degrees(heading - state[i, L.HEADING])
+
+
+@lean_kernel
+def _too_near(state: Array, i: int) -> int:
+    """Number of the boat nearest to boat ``i`` if it is within `KEEP_OFF_M` and not abaft the beam; -1 if it is not."""
+    near, least = -1, math.inf
+    for j in range(state.shape[0]):
+        gap = math.hypot(state[j, L.X] - state[i, L.X], state[j, L.Y] - state[i, L.Y])
+        if j != i and gap < least:
+            near, least = j, gap
+    if near < 0 or least > KEEP_OFF_M:
+        return -1
+    bearing = math.degrees(math.atan2(state[near, L.X] - state[i, L.X], state[near, L.Y] - state[i, L.Y]))
+    return near if abs(wrap_degrees(bearing - state[i, L.HEADING])) < 90.0 else -1

@@ -1,10 +1,9 @@
-"""`Chooser`: a small network over options, in numpy, from what a demonstration's row tells of a boat's sight."""
+"""Crowley-BU-LL: a small network over options, in numpy, and the scripted demonstrator that it was learned from."""
 
 from __future__ import annotations
 
 import json
 import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,14 +14,22 @@ from numpy.typing import NDArray
 from steerclear.env.whole_file import whole_file
 from steerclear.shield.exceptions import PolicyError
 
-from ..options import OPTIONS
+from ..demonstrator import row_of
+from ..options import OPTIONS, OptionPlayer, target
+from ..plane import distance
+from ..sight import Boat, Sight
+from .network import UNREADABLE
 
 Floats = NDArray[np.float64]
 OPTION_NAMES = tuple(OPTIONS)
-FORMAT = "steerclear-chooser"
-SKIPPED = frozenset({"option", "since_s", "chosen", "time_s", "boat"})
-ABOUT = frozenset({"preset", "opponent", "side", "seed", "captures", "captures_against"})
-MAX_BYTES = 16 * 2**20
+FORMAT, MAX_BYTES = "steerclear-chooser", 16 * 2**20
+NOT_SEEN = frozenset(
+    {"option", "since_s", "chosen", "time_s", "boat", "preset", "opponent", "side", "seed", "captures"}
+    | {"captures_against"}
+)
+"""Columns of a demonstration that a choice may not depend on."""
+ARRAYS = ("middle", "scale", "w1", "b1", "w2", "b2")
+THREAT_M = 40.0
 
 
 @dataclass
@@ -48,7 +55,7 @@ class Chooser:
     @staticmethod
     def columns(row: Mapping[str, Any]) -> list[str]:
         """Numbers of a row that a choice may depend on."""
-        return [name for name in row if name not in SKIPPED | ABOUT]
+        return [name for name in row if name not in NOT_SEEN]
 
     @classmethod
     def fresh(cls, names: list[str], hidden: int, rng: np.random.Generator, card: dict[str, Any]) -> Chooser:
@@ -89,35 +96,83 @@ class Chooser:
 
 
 def write_chooser(chooser: Chooser, path: Path) -> Path:
-    """Write one, whole or not at all.
-
-    Raises:
-        PolicyError: the file cannot be written.
-    """
+    """Write one, whole or not at all."""
     about = {"format": FORMAT, "names": chooser.names, "options": OPTION_NAMES, "card": chooser.card}
-    arrays = {name: getattr(chooser, name) for name in ("middle", "scale", "w1", "b1", "w2", "b2")}
     with whole_file(path, PolicyError) as part, part.open("wb") as file:
+        arrays = {name: getattr(chooser, name) for name in ARRAYS}
         np.savez_compressed(file, about=np.array(json.dumps(about)), **arrays)
     return path
 
 
 def read_chooser(path: Path) -> Chooser:
-    """Read one; nothing in it is run.
-
-    Raises:
-        PolicyError: there is none, or it is cut short.
-    """
+    """Read one; nothing in it is run."""
     try:
         with zipfile.ZipFile(path) as archive:
             if sum(member.file_size for member in archive.infolist()) > MAX_BYTES:
                 raise ValueError("it is too large")
         with path.open("rb") as file, np.load(file, allow_pickle=False) as found:
             about = json.loads(str(found["about"]))
-            arrays = {name: found[name] for name in ("middle", "scale", "w1", "b1", "w2", "b2")}
+            arrays = {name: found[name] for name in ARRAYS}
         if about["format"] != FORMAT or tuple(about["options"]) != OPTION_NAMES:
             raise ValueError("it chooses among other options")
         if not all(np.isfinite(array).all() for array in arrays.values()):
             raise ValueError("a number is not finite")
         return Chooser(names=list(about["names"]), card=about["card"], **arrays)
-    except (zipfile.BadZipFile, KeyError, ValueError, TypeError, OSError, EOFError, zlib.error) as error:
+    except UNREADABLE as error:
         raise PolicyError(f"{path} holds no chooser ({error}); train one with algorithm: cloning") from error
+
+
+class Cloned(OptionPlayer):
+    """Chooses options as a scripted demonstrator does, by behaviour cloning.
+
+    Args:
+        path: of a `Chooser`.
+    """
+
+    name = "crowley"
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self._chooser: Any = read_chooser(path)
+
+    def wish(self, sight: Sight, number: int) -> str:
+        """What the demonstrator would most likely choose."""
+        row = row_of(sight, number, self._choices[number], False)
+        seen = [[float(row[name]) for name in self._chooser.names]]
+        return OPTION_NAMES[int(self._chooser.choices(seen)[0])]
+
+
+class Teacher(OptionPlayer):
+    """The demonstrator to clone where there are no people's demonstrations.
+
+    Boat by boat: home with the flag, tag an intruder that comes near, else flank or attack.
+
+    Attributes:
+        rows: what it chose at what sight, see `demonstrator.row_of`.
+    """
+
+    name = "teacher"
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.rows: list[dict[str, Any]] = []
+
+    def look_round(self, sight: Sight) -> None:
+        """Choose, and keep what was chosen."""
+        super().look_round(sight)
+        self.rows += [row_of(sight, number, choice, True) for number, choice in enumerate(self._choices)]
+
+    def wish(self, sight: Sight, number: int) -> str:
+        """See the class."""
+        boat, foe = sight.own[number], target(sight, number)
+        if boat.carries:
+            return "retreat"
+        if foe is not None and boat.recharged and boat.on_side and _is_nearest(sight, number, foe):
+            return "tag"
+        return "attack" if boat.y > 0.5 * sight.size[1] or boat.x > sight.line else "flank"
+
+
+def _is_nearest(sight: Sight, number: int, foe: Boat) -> bool:
+    """Whether the boat is the nearest free own one to a foe that has come near."""
+    ways = [distance(boat.at, foe.at) if not boat.tagged else 1e9 for boat in sight.own]
+    return ways[number] == min(ways) and ways[number] < THREAT_M

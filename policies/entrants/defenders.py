@@ -1,0 +1,164 @@
+"""Three teams that defend their base: Alamer-EJUST and Ohto-Indep hold stations, Meo-Indep marks attackers.
+
+What the paper says of each is in its class; what we filled in stands beside it.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import combinations
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from .catalogue import entrant
+from .plane import GAP_M, STOP_MPS, Order, ahead, assign, clip, cross, distance, heading_to, meeting_point, row, wrap
+from .plane import go as go_to
+from .play import EntrantTeam
+from .sight import Boat, Point, Sight
+
+REACHES = 1.3
+ANEW_S = 3.0
+ALAMER_ARRIVED_M, ALAMER_LEFT_M = 2.0, 6.0
+FACING_RAD = math.radians(45.0)
+TURNING_SHARE = 0.1
+"""Share of top speed at which a boat of Alamer turns on the spot."""
+MEO_ARRIVED_M, MARGIN_M = 3.0, 2.0
+"""Meo's boats stop so near to their points, which are kept so far off the dividing line and the edges, m."""
+OHTO_ARRIVED_M, COAST_S = 2.0, 3.0
+"""A boat has arrived this near to its post, or where it coasts to: it goes on for about its speed times so long."""
+DRIVEN_OFF = 0.6
+"""Of the way between two posts: a boat that holds goes back to its post from there."""
+SLOWING_S, SLOWEST = 20.0, 0.1
+"""A boat this far from its post in time slows down, to no less than this share of its top speed: it has no brakes."""
+ABEAM_RAD, CRAWL = math.radians(80.0), 0.3
+"""Off a post by more than this a boat turns at this share of its top speed: at full speed it would circle the post."""
+
+
+@entrant(
+    "alamer", "stationary defence: holds at the point of interception and faces the foe (Alamer-EJUST)", "Alamer-EJUST"
+)
+class Alamer(EntrantTeam):
+    """Holds near the base at the closest points of interception and turns to face the opponent.
+
+    Filled in: a foe's point of interception lies on its straight way to the flag, `REACHES` grab radii before the flag
+    (nearer when the foe is); points too near to each other are moved round the flag; boats take points by least total
+    distance, anew every `ANEW_S`, and move when theirs lies further off than `ALAMER_LEFT_M`; a boat turns to face at a
+    crawl, since these boats turn only under thrust.
+    """
+
+    name = "alamer"
+
+    def begin(self, sight: Sight) -> None:
+        """Nobody has a point yet."""
+        self._moving = [True] * len(sight.own)
+        self._points: list[Point] = []
+        self._until_s = -math.inf
+
+    def decide(self, sight: Sight) -> list[Order]:
+        """Go to the points, hold there, face the nearest foes."""
+        if sight.time >= self._until_s:
+            self._until_s = sight.time + ANEW_S
+            points = _apart(sight, [_interception(sight, foe) for foe in sight.foes])
+            chosen = assign([boat.at for boat in sight.own], points)
+            self._points = [points[n] if n >= 0 else boat.at for boat, n in zip(sight.own, chosen, strict=True)]
+        return [self._order(sight, number, boat) for number, boat in enumerate(sight.own)]
+
+    def _order(self, sight: Sight, number: int, boat: Boat) -> Order:
+        point = self._points[number]
+        self._moving[number] = distance(boat.at, point) > (ALAMER_ARRIVED_M if self._moving[number] else ALAMER_LEFT_M)
+        if self._moving[number]:
+            return go_to(boat, point)
+        foe = min(sight.foes, key=lambda foe: distance(boat.at, foe.at))
+        facing = heading_to(boat.at, foe.at)
+        return (TURNING_SHARE * boat.top if abs(wrap(facing - boat.heading)) > FACING_RAD else STOP_MPS), facing
+
+
+def _interception(sight: Sight, foe: Boat) -> Point:
+    """The point of a foe's way to the flag at which it is waited for."""
+    inner, outer = sight.keepout + foe.radius + 1.0, REACHES * sight.reach
+    x, y = ahead(sight.home, heading_to(sight.home, foe.at), clip(distance(sight.home, foe.at), inner, outer))
+    return clip(x, 2.0, sight.line - 2.0), clip(y, 2.0, sight.size[1] - 2.0)
+
+
+def _apart(sight: Sight, points: list[Point]) -> list[Point]:
+    """The same points, those too near to an earlier one moved round the flag."""
+    kept: list[Point] = []
+    for point in points:
+        radius, heading = distance(sight.home, point), heading_to(sight.home, point)
+        step = GAP_M / max(radius, 1.0)
+        tries = [ahead(sight.home, heading + sign * k * step, radius) for k in range(4) for sign in (1.0, -1.0)]
+        inside = [p for p in tries if 1.0 < p[0] < sight.line and 1.0 < p[1] < sight.size[1] - 1.0]
+        fits = [p for p in inside if all(distance(p, other) >= 0.9 * GAP_M for other in kept)]
+        kept.append(fits[0] if fits else point)
+    return kept
+
+
+@entrant("meo", "man-to-man defence: intercept points, pairs of least total distance (Meo-Indep)", "Meo-Indep")
+class Meo(EntrantTeam):
+    """Intercept points of every pair of defender and attacker, pairs of the least total distance, one boat to each.
+
+    Each boat drives to its point at full speed and stops there; where paths of teammates cross, one heading is turned
+    to the opposite. Filled in: an intercept point is where the defender at full speed meets the attacker going on as it
+    does, moved into the own half; of two boats whose paths cross the later one is turned.
+    """
+
+    name = "meo"
+
+    def decide(self, sight: Sight) -> list[Order]:
+        """Full speed to the intercept points, one of two crossing boats turned round."""
+        ways = [(boat.at, point) for boat, point in zip(sight.own, _marked(sight), strict=True)]
+        crossing = {j for i, j in combinations(range(len(ways)), 2) if cross(*ways[i], *ways[j])}
+        headings = [heading_to(*way) + (math.pi if number in crossing else 0.0) for number, way in enumerate(ways)]
+        return [
+            (STOP_MPS if distance(*way) <= MEO_ARRIVED_M else boat.top, heading)
+            for boat, way, heading in zip(sight.own, ways, headings, strict=True)
+        ]
+
+
+def _marked(sight: Sight) -> list[Point]:
+    """Where each own boat meets the attacker it marks; its own place where there are fewer attackers."""
+
+    def met(boat: Boat, foe: Boat) -> Point:
+        x, y = meeting_point(boat, foe)
+        return clip(x, MARGIN_M, sight.line - MARGIN_M), clip(y, MARGIN_M, sight.size[1] - MARGIN_M)
+
+    points = [[met(boat, foe) for foe in sight.foes] for boat in sight.own]
+    costs = np.array([[distance(boat.at, p) for p in some] for boat, some in zip(sight.own, points, strict=True)])
+    found = [boat.at for boat in sight.own]
+    for boat, foe in zip(*linear_sum_assignment(costs), strict=True):
+        found[int(boat)] = points[int(boat)][int(foe)]
+    return found
+
+
+@entrant("ohto", "stationary defence: holds before its base (Ohto-Indep)", "Ohto-Indep")
+class Ohto(EntrantTeam):
+    """Holds where it starts, near the base: there and in the presets that is a row across the own half.
+
+    Filled in: where a game starts boats elsewhere, they first drive to the places of that row, by least total distance,
+    and hold there for good.
+    """
+
+    name = "ohto"
+
+    def begin(self, sight: Sight) -> None:
+        """Choose each boat's station."""
+        posts = row(sight)
+        self._posts: list[Point] = [posts[number] for number in assign([boat.at for boat in sight.own], posts)]
+        self._far_m = DRIVEN_OFF * sight.size[1] / (len(posts) + 1)
+        self._moving = [True] * len(sight.own)
+
+    def decide(self, sight: Sight) -> list[Order]:
+        """Hold; drive back when the game drove a boat off."""
+        return [self._order(boat, number) for number, boat in enumerate(sight.own)]
+
+    def _order(self, boat: Boat, number: int) -> Order:
+        post = self._posts[number]
+        way_m, arrived_m = distance(boat.at, post), max(OHTO_ARRIVED_M, COAST_S * math.hypot(*boat.velocity))
+        self._moving[number] = way_m > (arrived_m if self._moving[number] else self._far_m)
+        if not self._moving[number]:
+            return STOP_MPS, boat.heading
+        heading = heading_to(boat.at, post)
+        if abs(wrap(heading - boat.heading)) > ABEAM_RAD:
+            return CRAWL * boat.top, heading
+        return clip(way_m / SLOWING_S, SLOWEST * boat.top, boat.top), heading
