@@ -12,16 +12,10 @@ from ..platforms import Platform
 
 STANDARD_TIMEOUT_S = 3.0
 TOP_SPEED_TOLERANCE = 1.02
-GROUND_SYSTEM = 255.0
-"""Our system id."""
-
-NEEDED_CHECKS = {2: "compass", 3: "GPS", 4: "INS"}
-"""Arming checks, by their bit, of what position and heading rest on."""
-
+GROUND_SYSTEM = 255.0  # our system id
+NEEDED_CHECKS = {2: "compass", 3: "GPS", 4: "INS"}  # arming checks, by their bit, of what position and heading rest on
 OBSTACLE_SENSORS = ("PRX1_TYPE", "PRX_TYPE")
-AVOIDS = 3.0
-"""What Rover's AVOID_ENABLE is where nobody heard it: its default."""
-
+AVOIDS = 3.0  # what Rover's AVOID_ENABLE is where nobody heard it: its default
 ASKED = (
     "FS_GCS_ENABLE", "GUID_TIMEOUT", "SYSID_MYGCS", "SYSID_ENFORCE", "MAV_GCS_SYSID", "MAV_GCS_SYSID_HI", "MAV_OPTIONS",
     "ARMING_CHECK", "ARMING_SKIPCHK", "FENCE_ENABLE", "AVOID_ENABLE", *OBSTACLE_SENSORS, "BCN_TYPE",
@@ -90,7 +84,7 @@ def _changes(known: Mapping[str, float]) -> list[str]:
     """What in the autopilot changes a command after the shield, or takes the boat away from it."""
     avoid, on = _bits(known, "AVOID_ENABLE", AVOIDS), {name for name, value in known.items() if value != 0.0}
     sensors = [name for name in OBSTACLE_SENSORS if name in on]
-    found = {f"{name} is {known[name]:g}": name for name in ("OA_TYPE", "SAIL_ENABLE") if name in on}
+    found: dict[str, str] = {f"{name} is {known[name]:g}": name for name in ("OA_TYPE", "SAIL_ENABLE") if name in on}
     if avoid & 2 and sensors:
         found[f"AVOID_ENABLE has bit 1 and {sensors[0]} is on"] = "AVOID_ENABLE"
     if avoid & 4 and "BCN_TYPE" in on:

@@ -29,8 +29,7 @@ from .tracker import Tracker
 
 LOG = logging.getLogger(__name__)
 
-TALK_EVERY_S = 5.0
-"""The same failure of the decision is logged again after this long, s."""
+TALK_EVERY_S = 5.0  # the same failure of the decision is logged again after this long, s
 
 
 @dataclass(frozen=True)

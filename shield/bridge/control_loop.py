@@ -44,8 +44,7 @@ TALK_EVERY_S, LATE_EVERY_S = 5.0, 10.0
 RETAKE_S, RETOLD_S = 6.0, 10.0
 """An autopilot is asked for so long when a boat is taken back, s: a pilot who takes it again meanwhile is not fought
 for longer. What came of it is shown, and it is not tried again by itself, for so long."""
-BIN_S, BINS = 0.0001, 20_000
-"""Width, s, and number of bins that durations are counted in."""
+BIN_S, BINS = 0.0001, 20_000  # width, s, and number of bins that durations are counted in
 
 
 @dataclass(frozen=True)

@@ -28,20 +28,14 @@ from .preflight_checks import Check, CheckResult, found
 AHEAD_S = 8.0
 TURN_S = 7.0
 STOP_S = 5.0
-EACH_S = AHEAD_S + TURN_S + STOP_S
-"""How long the drill of one boat takes, s."""
-
+EACH_S = AHEAD_S + TURN_S + STOP_S  # how long the drill of one boat takes, s
 TURN_RAD = math.radians(60.0)
 TOP_SHARE = 0.6
 FASTEST_MPS = 1.5
 COURSE_STEP_DEG = 15.0
-ENOUGH_M, EDGE_M = 20.0, 10.0
-"""Room beyond which others, and the geofence's edge, disturb no drill, m."""
-TURN_COST_M = 0.5
-"""A first turn that differs by a radian from a right angle counts as so much less room, m."""
-SAME_MPS, SAME_RAD = 0.05, math.radians(1.0)
-"""Commands that differ by less are the same."""
-
+ENOUGH_M, EDGE_M = 20.0, 10.0  # room beyond which others, and the geofence's edge, disturb no drill, m
+TURN_COST_M = 0.5  # a first turn that differs by a radian from a right angle counts as so much less room, m
+SAME_MPS, SAME_RAD = 0.05, math.radians(1.0)  # commands that differ by less are the same
 COURSE_DEG = 15.0
 COURSE_MPS = 0.8
 STEADY_DPS = 5.0
@@ -52,13 +46,10 @@ LONGEST_DELAY_STEPS = 8
 LONGEST_DELAY_S = 0.6
 SLOWER = 0.6
 """A boat that turns at so much less than its model's rate is slow, not late, though the two look alike at first."""
-SAME_S = 0.005
-"""Delays that are told apart by less are told as the same, s."""
+SAME_S = 0.005  # delays that are told apart by less are told as the same, s
 TURNED_DEG = 15.0
-LONG_ENOUGH_S = 3.0
-"""Only where a heading was told for so long it is judged whether the boat turned away from it."""
-MOST_CHANGED = 0.4
-"""Of a drill with a greater share of commands changed too little is left to judge."""
+LONG_ENOUGH_S = 3.0  # only where a heading was told for so long it is judged whether the boat turned away from it
+MOST_CHANGED = 0.4  # of a drill with a greater share of commands changed too little is left to judge
 
 
 @dataclass(frozen=True)
@@ -340,8 +331,8 @@ def _fit(told: Sequence[DrillSample], measured: Array, platform: Platform, dt_s:
             error = _half_turn(math.degrees(command.heading_rad) - row[L.HEADING])
             step_boat(params, row, command.speed_mps, error, dt_s)
     heading = _half_turn(measured[:, 0] - foretold[:, 0])
-    rms = (float(np.sqrt(np.mean(off**2))) for off in (heading, measured[:, 1] - foretold[:, 1]))
-    return _Fit(*rms, _fastest_dps(measured[:, 0], dt_s), _fastest_dps(foretold[:, 0], dt_s))
+    heading_rms, speed_rms = (float(np.sqrt(np.mean(off**2))) for off in (heading, measured[:, 1] - foretold[:, 1]))
+    return _Fit(heading_rms, speed_rms, _fastest_dps(measured[:, 0], dt_s), _fastest_dps(foretold[:, 0], dt_s))
 
 
 def _delay_s(costs: Sequence[float], dt_s: float) -> float:

@@ -19,34 +19,23 @@ from ..platforms import layout as L
 from ..tracks import thrust_at, whole_steps
 from .messages import BoatReading
 
-GAIN = 0.5
-"""Share of a difference that is corrected at once: a filter of about 0.15 s at 10 Hz."""
-
+GAIN = 0.5  # share of a difference that is corrected at once: a filter of about 0.15 s at 10 Hz
 ROUNDING = np.array([0.01, 0.01, 0.02, 0.01])
 """Differences below this (m, m, deg, m/s) are what messages round off, and are left alone."""
-
 SURPRISE = np.array([1.5, 1.5, 25.0, 0.6])
 """Differences beyond this (m, m, deg, m/s) say that the boat did not obey the model: it starts afresh there."""
-
-BOAT_TIMEOUT_S = 3.0
-"""A boat that hears nothing goes on with its last command for this long, then stops."""
-
+BOAT_TIMEOUT_S = 3.0  # a boat that hears nothing goes on with its last command for this long, then stops
 SPENT_S = 1.0
 """A command not repeated for this long says nothing any more: somebody else steers, and the boat goes straight on."""
-
 LONGEST_GAP_STEPS = 50
 """Steps run at once at most, after a standstill of the loop; beyond it the row waits for telemetry."""
-
 GONE_M, LEFT_M, STILL_MPS = 0.3, 0.05, 0.1
 """A source that repeats itself to the last digit while the model goes the first is frozen, since it left by the second.
 Slower than the third a boat lies still."""
-
 MOST_UNSEEN_M = 2.0
 """A boat found at rest again after it may have gone unseen is believed anew until that way is longer than this, m."""
-
 RATE_AGE_S, RATE_ROUNDING_DPS, RATE_GAIN = 0.15, 2.0, 0.3
 """Turn rates told are taken when no older, s; smaller differences, deg/s, are left alone; of larger ones this share."""
-
 _SEEN = [L.X, L.Y, L.HEADING, L.SPEED]
 
 

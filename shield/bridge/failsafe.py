@@ -23,19 +23,15 @@ from .tracker import Track, Tracker
 STRENGTH = {"none": 0, "go_on": 0, "hold_course": 1, "slow": 2, "hold_station": 3, "return": 4, "stop": 5}
 """Of several responses due at once the strongest is done."""
 
-RIVAL_S = 2.0
-"""A second commander counts as there for this long after its last command was noticed, s."""
-WHOLE_S = 99.0
-"""Ages beyond this are shown in whole seconds."""
+RIVAL_S = 2.0  # a second commander counts as there for this long after its last command was noticed, s
+WHOLE_S = 99.0  # ages beyond this are shown in whole seconds
 SPEED_SHARE, SPEED_MORE_MPS, MOST_TURNS_RAD = 1.5, 0.5, 100.0
 """Speeds beyond this share of the platform's top plus this much, and such headings, are nobody's who knows the boat."""
 
 STATION_M, STATION_SHARE = 3.0, 0.5
 """A boat holding station steers back when farther from it than the first, m, at that share of top speed."""
-INSIDE_M = 3.0
-"""Boats return to this far inside the geofence, m."""
-REST_MPS = 0.2
-"""A boat slower than this lies still, m/s."""
+INSIDE_M = 3.0  # boats return to this far inside the geofence, m
+REST_MPS = 0.2  # a boat slower than this lies still, m/s
 
 
 @dataclass(frozen=True)

@@ -60,23 +60,17 @@ LOG = logging.getLogger(__name__)
 PACKETS_PER_S, FORGED_COST = 1000.0, 0.1
 """Packets read a second, so that a flood takes no time from the loop; one that is not sealed as it should be is not
 looked into and costs less."""
-FAR_M = 20_000.0
-"""A boat further from the field than this is an error of the sender."""
-LATE_S = 0.5
-"""Sealed packets later than this, beside the sender's quickest, are told."""
+FAR_M = 20_000.0  # a boat further from the field than this is an error of the sender
+LATE_S = 0.5  # sealed packets later than this, beside the sender's quickest, are told
 MAX_SENDERS, MAX_BOATS_TOLD, MAX_SOURCES = 64, 256, 8
 """Senders and boats remembered; senders kept of one boat: where more speak at once nobody can tell whom to believe."""
-GONE_S = 2.0
-"""A sender silent for so long may begin anew: another start of it, or a lower count, is taken then."""
-REFEREE_GONE_S = 5.0
-"""A second referee is listened to once the first has been silent this long."""
+GONE_S = 2.0  # a sender silent for so long may begin anew: another start of it, or a lower count, is taken then
+REFEREE_GONE_S = 5.0  # a second referee is listened to once the first has been silent this long
 MOST_AHEAD, REORDERED = 1000, 100
 """A count this much further than the last is not of the sender that speaks; packets this far behind may have been
 overtaken on the way, older ones show that two programs count."""
-DRIFT = 1e-3
-"""Clocks go apart by less than this, s per s."""
-BUFFER_BYTES = 1 << 18
-"""What the kernel keeps for us: a fraction of a second of a flood, not more."""
+DRIFT = 1e-3  # clocks go apart by less than this, s per s
+BUFFER_BYTES = 1 << 18  # what the kernel keeps for us: a fraction of a second of a flood, not more
 _WAKE_S, _PAUSE_S = 0.2, 0.02
 _SEAL_TEXTS = {
     "unsigned": "packet without a seal; the file has signing, so give its sender the key",

@@ -26,21 +26,14 @@ from .mavlink.signing import SigningClock
 from .messages import Closing, Tick
 
 LOG = logging.getLogger(__name__)
-
-PUBLISH_EVERY = 2
-"""Every second tick's positions are published."""
-
+PUBLISH_EVERY = 2  # every second tick's positions are published
 KEY_BYTES = 32
 PURPOSE = b"steerclear feed 1"
 _MARK, _DIGITS = b"\nhmac-sha256:", 64
 SEAL_BYTES = len(_MARK) + _DIGITS
-
-MAX_BYTES = 32768
-"""Largest datagram taken."""
+MAX_BYTES = 32768  # largest datagram taken
 MOST_BOATS = 64
-
-_FAR_OUT = frozenset({655.35, 6553.5, 65535.0})
-"""16 bits of ones, in the units boats and receivers use: not available."""
+_FAR_OUT = frozenset({655.35, 6553.5, 65535.0})  # 16 bits of ones, in the units boats and receivers use: not available
 NOT_AVAILABLE: Mapping[str, frozenset[float]] = {
     "heading_deg": _FAR_OUT | {-360.0, 360.0, 511.0, 3600.0, 36000.0},
     "speed_mps": _FAR_OUT | {102.3, 1023.0},

@@ -24,11 +24,8 @@ from .fleet_yaml import MOST_BYTES, read_settings
 from .frame import FieldFrame
 from .static_obstacles import corners_m, read_obstacles
 
-VERSION = 1
-"""Of the format."""
-
-OUTSIDE_TEAM = 2
-"""Team number of boats outside the game that are nobody's."""
+VERSION = 1  # of the format
+OUTSIDE_TEAM = 2  # team number of boats outside the game that are nobody's
 
 
 class FleetFile(FleetSettings):

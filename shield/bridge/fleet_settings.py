@@ -258,7 +258,7 @@ class ModelLimit(Section):
     foreseen 2 s ago, for ``after_s``: the response; for ``give_up_after_s``: handed over, by another.
     """
 
-    widest_m: float = Field(1.0, ge=0.0, le=10.0, description="give metres, 0 to 10")
+    widest_m: float = Field(default=1.0, ge=0.0, le=10.0, description="give metres, 0 to 10")
     outside_m: Length = 1.5
     after_s: Seconds = 3.0
     then: Response = "slow"
@@ -281,7 +281,7 @@ class Limits(Section):
     geofence: FenceLimit = FenceLimit()
     log: LogLimit = LogLimit()
     model: ModelLimit = ModelLimit()
-    after_failsafe: Literal["wait", "retake"] = Field("wait", description="give wait or retake")
+    after_failsafe: Literal["wait", "retake"] = Field(default="wait", description="give wait or retake")
 
 
 class End(Section):

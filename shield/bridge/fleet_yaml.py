@@ -14,13 +14,9 @@ import yaml
 
 from ..exceptions import FleetFileError
 
-MOST_BYTES = 128 << 10
-"""Largest text, bytes: 64 boats with all their settings take a tenth."""
-DEEPEST, MOST_NODES = 12, 20_000
-"""Settings lie at most so deep; values, each alias counted as all that it stands for."""
-LONGEST_TEXT, LONGEST_NUMBER = 1000, 32
-"""Characters of one value; digits and signs of a number."""
-
+MOST_BYTES = 128 << 10  # largest text, bytes: 64 boats with all their settings take a tenth
+DEEPEST, MOST_NODES = 12, 20_000  # settings lie at most so deep; values, each alias counted as all that it stands for
+LONGEST_TEXT, LONGEST_NUMBER = 1000, 32  # characters of one value; digits and signs of a number
 _WORDS: dict[str, bool | None] = {"": None, "~": None, "null": None, "Null": None, "NULL": None}
 _WORDS |= {word: word.lower() == "true" for word in ("true", "True", "TRUE", "false", "False", "FALSE")}
 _WHOLE = re.compile(r"[-+]?(0|[1-9][0-9]*)")

@@ -26,27 +26,22 @@ from .mavlink.vehicle import LinkHealth
 from .messages import BoatReading, Link
 from .preflight_checks import Check, CheckResult, Found, checks_by_kind, found
 
-CIRCLE_TYPE, POLYGON_TYPE = 2, 4
-"""Bits of FENCE_TYPE; the first bit is altitude."""
+CIRCLE_TYPE, POLYGON_TYPE = 2, 4  # bits of FENCE_TYPE; the first bit is altitude
 DEFAULTS = {"FENCE_TYPE": 6.0, "FENCE_RADIUS": 150.0, "FENCE_MARGIN": 2.0, "AVOID_ENABLE": 3.0, "AVOID_MARGIN": 2.0}
 """Of ArduPilot Rover, for what was not heard."""
 STOPPED_SHARE, LONGEST_STOP_S = 0.02, 120.0
 PART_M, MOST_PARTS = 0.05, 100_000
 """A fence's edges are looked at this finely, m, in no more parts; half a part is taken off."""
 Box = tuple[float, float, float, float]
-
 LONGEST_TRIP_S = 0.2
-OLDEST_S = 0.5
-"""No field may get older than this while watched."""
-WALL_S = 30.0
-"""Signing refuses a clock a minute off; half of that is worth a word."""
+OLDEST_S = 0.5  # no field may get older than this while watched
+WALL_S = 30.0  # signing refuses a clock a minute off; half of that is worth a word
 REST_MPS = 0.3
 SPREAD_M, RMS_M = 1.5, 0.5
 _REFUSED = (
     "bad_checksum", "clock", "impossible_position", "impossible_speed", "impossible_attitude",
     "no_fix", "fix_silent", "poor_fix", "no_estimate",
 )  # fmt: skip
-
 WATCH_S = 5.0
 LOOK_EVERY_S = 0.05
 

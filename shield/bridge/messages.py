@@ -24,15 +24,9 @@ from ..surroundings import Surroundings
 from .fleet_settings import BoatSettings
 
 LOG = logging.getLogger(__name__)
-
-NEVER_S = math.inf
-"""Age of what was never received."""
-
-TELEMETRY = "telemetry"
-"""Source of contacts that a boat's own link told; nobody else may call himself so."""
-
-PILOT, FAILSAFE = "pilot", "failsafe"
-"""Who may have taken a boat: a person, or the autopilot's own fail-safe."""
+NEVER_S = math.inf  # age of what was never received
+TELEMETRY = "telemetry"  # source of contacts that a boat's own link told; nobody else may call himself so
+PILOT, FAILSAFE = "pilot", "failsafe"  # who may have taken a boat: a person, or the autopilot's own fail-safe
 
 
 @dataclass(frozen=True)
@@ -118,6 +112,7 @@ class Link(Protocol):
 
     def learn(self, timeout_s: float) -> None:
         """Ask for what checks look at and is not known yet; mostly nothing."""
+        return
 
     def prepare(self, timeout_s: float, is_off: Callable[[], bool] = never) -> None:
         """Bring the boat to where it obeys: mode and arming, each step checked.
@@ -165,9 +160,11 @@ class LinkMaker(Protocol):
 
     def open(self) -> None:
         """Open all that is shared, or raise `LinkError`."""
+        return
 
     def close(self) -> None:
         """Give it back; may be called again."""
+        return
 
     def sources(self) -> Sequence[ContactSource]:
         """Who tells of other boats by the same way."""
@@ -269,12 +266,14 @@ class WantedSource(Protocol):
 
     def offer(self, snapshot: Snapshot) -> None:
         """Show it the latest snapshot; older ones it has not looked at are dropped."""
+        return
 
     def latest(self) -> Answer:
         """Its latest answer."""
 
     def close(self) -> None:
         """End it."""
+        return
 
 
 @dataclass(frozen=True)

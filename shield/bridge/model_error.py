@@ -19,26 +19,18 @@ from ..tracks import run_on_commands, steps_of_delay
 from .fleet_file import FleetFile
 from .messages import Action, BoatReading, Sent
 
-AHEAD_S = (1.0, 2.0, 3.0)
-"""How long ago what is compared was predicted, s."""
+AHEAD_S = (1.0, 2.0, 3.0)  # how long ago what is compared was predicted, s
 TOLD_BY = 1
 """Place in `AHEAD_S` of the errors that make the margin: a backup is chosen anew long before it is carried out."""
-SHARE = 0.95
-"""Quantile of the errors that a margin covers."""
-MEMORY_S = 60.0
-"""Errors are remembered for so long, s."""
-ENOUGH_S = 5.0
-"""Errors of at least so long are needed before they count, s."""
-WIDEN_MPS = 0.1
-"""A margin changes no faster, m/s: a jump of it would look like a breach."""
-WORTH_TELLING_M = 0.15
-"""Margins beyond what was declared by more than this are told."""
+SHARE = 0.95  # quantile of the errors that a margin covers
+MEMORY_S = 60.0  # errors are remembered for so long, s
+ENOUGH_S = 5.0  # errors of at least so long are needed before they count, s
+WIDEN_MPS = 0.1  # a margin changes no faster, m/s: a jump of it would look like a breach
+WORTH_TELLING_M = 0.15  # margins beyond what was declared by more than this are told
 ROUNDING_M = 0.05
 """Errors up to this are what messages round off: a boat that is its model is decided for as in the simulator."""
-FRESH_S = 0.3
-"""Places older than this are no measurement, s."""
-LATE = 0.6
-"""Part of a step that a turn may begin late by and still count as in its place."""
+FRESH_S = 0.3  # places older than this are no measurement, s
+LATE = 0.6  # part of a step that a turn may begin late by and still count as in its place
 
 
 class ModelErrorMonitor:

@@ -11,9 +11,7 @@ from .failsafe_table import DISABLES
 from .messages import Action
 
 LOG = logging.getLogger(__name__)
-
-LONGEST_OVERRIDE_S = 600.0
-"""No override lasts longer; it can be given again."""
+LONGEST_OVERRIDE_S = 600.0  # no override lasts longer; it can be given again
 
 
 @dataclass(frozen=True)

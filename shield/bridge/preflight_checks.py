@@ -24,9 +24,7 @@ from .static_obstacles import StaticObstacles
 from .tracker import Tracker
 
 LOG = logging.getLogger(__name__)
-
-NEAR_MARGIN_M = 1e5
-"""Margins beyond this mean that nobody is near."""
+NEAR_MARGIN_M = 1e5  # margins beyond this mean that nobody is near
 
 
 @dataclass(frozen=True)
@@ -48,8 +46,7 @@ class Check:
     run: Callable[[], CheckResult]  # does it; takes its time, moves boats only if its description says so
 
 
-Found = tuple[bool, str, Mapping[str, float]]
-"""What a check found: whether it passed, the line, the figures."""
+Found = tuple[bool, str, Mapping[str, float]]  # what a check found: whether it passed, the line, the figures
 Seen = TypeVar("Seen")
 
 

@@ -26,8 +26,7 @@ from .moos.links import MoosLinks
 LOG = logging.getLogger(__name__)
 
 CONNECT_S = 15.0
-PREPARE_S = 60.0
-"""An autopilot arms up to 42 s after it was switched on."""
+PREPARE_S = 60.0  # an autopilot arms up to 42 s after it was switched on
 
 
 class VehicleSession(Closing):
@@ -127,8 +126,8 @@ class VehicleSession(Closing):
 
     def close(self) -> None:
         """Stop every boat, verify it, and give everything back; may be called again."""
-        if self.links and not self.left:
-            with ThreadPoolExecutor(len(self.links)) as pool:
+        if not self.left:
+            with ThreadPoolExecutor(max(1, len(self.links))) as pool:
                 self.left = tuple(pool.map(_leave, self.links.values()))
             for link in self.ears.values():
                 link.release()

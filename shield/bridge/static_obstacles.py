@@ -19,13 +19,9 @@ if TYPE_CHECKING:
     from .fleet_file import FleetFile
 
 FORMS = ("polygon_m", "polygon_deg", "circle_m", "geojson")
-MOST_EDGES = 400
-"""Of all obstacles together: the shield looks at each at every turn."""
-FARTHEST_M = 20_000.0
-"""An obstacle farther from the geofence is in another water, or its numbers are in another order."""
-MOST_BYTES = 4 << 20
-"""Of a GeoJSON file."""
-
+MOST_EDGES = 400  # of all obstacles together: the shield looks at each at every turn
+FARTHEST_M = 20_000.0  # an obstacle farther from the geofence is in another water, or its numbers are in another order
+MOST_BYTES = 4 << 20  # of a GeoJSON file
 Line = tuple[tuple[float, float], ...]
 
 

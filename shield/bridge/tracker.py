@@ -23,27 +23,19 @@ from .fleet_file import FleetFile
 from .messages import NEVER_S, Alarm, BoatReading, Contact, Sent
 
 LOG = logging.getLogger(__name__)
-
 TALK_EVERY_S, MOST_TOLD = 5.0, 256
 """The same fault of a boat is logged again after so long, and so many are remembered: names on a feed are anybody's."""
-GHOST = "~"
-"""Names of ghosts are the boat's name, this and a number; no boat of a fleet file has it in its name."""
-
-FARTHEST_M = 1e5
-"""Positions farther from the field's corner than this are faults."""
+GHOST = "~"  # names of ghosts are the boat's name, this and a number; no boat of a fleet file has it in its name
+FARTHEST_M = 1e5  # positions farther from the field's corner than this are faults
 SPEED_SHARE, SPEED_MORE_MPS = 2.0, 1.0
 """Speeds beyond this share of the platform's top plus this much are faults: current and wind give less."""
-JUMP_M = 3.0
-"""Differences from where the boat must be that no receiver's noise explains, m."""
+JUMP_M = 3.0  # differences from where the boat must be that no receiver's noise explains, m
 BELIEVED_AFTER_S = 2.0
 """A new place told consistently for this long is believed, s, if nobody else sees the boat elsewhere."""
 MOVED_M, FROZEN_M = 0.05, 0.6
 """A position that moved less than the first while the boat's speed says it ran the second is frozen, m."""
-UNDER_WAY_MPS = 0.2
-"""Slower boats may well stay where they are: noise of the speed is no way run."""
-
-EARLY_S = 0.1
-"""Contacts fixed later than now by more than this are faults of a clock."""
+UNDER_WAY_MPS = 0.2  # slower boats may well stay where they are: noise of the speed is no way run
+EARLY_S = 0.1  # contacts fixed later than now by more than this are faults of a clock
 MOST_SOURCES, MOST_STORIES = 32, 3
 """Sources remembered of a boat; places kept clear of for it: when more are told nobody knows where it is."""
 VAGUE_M = 10.0

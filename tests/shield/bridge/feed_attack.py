@@ -1,8 +1,6 @@
 """What an attacker on the feed's own network sends, and what a true sender with a key does."""
 
 import itertools
-import socket
-import time
 
 from steerclear.shield.bridge.feed import FlagStatus, GameState, Packet
 from steerclear.shield.bridge.feed_packets import Fix, Seal
@@ -33,14 +31,3 @@ def forged(*boats, latitude_deg=42.0004, longitude_deg=-71.0, keys=(bytes(32),),
         for key in keys:
             yield Seal(key).close(position)
             yield Seal(key).close(game)
-
-
-def flood(address, ending, packets, rate_hz):
-    """Send packets to HOST:PORT at a rate until told to end."""
-    host, port = address.rsplit(":", 1)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
-        due = time.monotonic()
-        while not ending.is_set():
-            out.sendto(next(packets), (host, int(port)))
-            due += 1.0 / rate_hz
-            time.sleep(max(0.0, due - time.monotonic()))

@@ -118,16 +118,6 @@ def test_junk_names_keep_nobody_out_and_push_out_nobody_who_was_there(junk):
     assert len(order._senders) <= MAX_SENDERS
 
 
-def test_who_is_silent_makes_room_first():
-    order = Order()
-    order.problem(packet(1, sender="s3"), 0.0)
-    for k in set(range(MAX_SENDERS)) - {3}:
-        order.problem(packet(1, sender=f"s{k}"), 10.0)
-    order.problem(packet(1, sender="new"), 10.0)
-    assert "s3" not in order._senders
-    assert {"s0", "s63", "new"} <= set(order._senders)
-
-
 def test_a_game_is_kept_by_one_referee_and_taken_over_only_after_its_silence():
     order = Order()
     assert order.problem(packet(1, sender="referee", game=GAME), 0.0) is None

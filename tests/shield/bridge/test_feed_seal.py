@@ -3,12 +3,11 @@
 import hmac
 import json
 import socket
-import threading
 import time
 from pathlib import Path
 
 import pytest
-from feed_attack import GAME, flood, forged, sealed
+from feed_attack import GAME, forged, sealed
 from steerclear.shield.bridge.clock import ManualClock, MonotonicClock
 from steerclear.shield.bridge.feed import FeedReceiver, FeedSender, Fix, Packet
 from steerclear.shield.bridge.feed_packets import MAX_BYTES, SEAL_BYTES, Seal, is_sealed
@@ -88,30 +87,6 @@ def test_keys_of_another_length_and_packets_that_leave_no_room_for_the_seal_are_
     with pytest.raises(FeedError, match="fewer boats"):
         Packet("hub", 1, 1, fixes=(Fix("b" * 60, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0),) * 200).encode()
     assert len(Seal(KEY).close(b"x" * (MAX_BYTES - SEAL_BYTES))) == MAX_BYTES
-
-
-def test_on_loopback_an_attacker_at_200_hz_is_not_heard_and_costs_no_true_packet():
-    with FeedReceiver("127.0.0.1:0", FRAME, MonotonicClock(), boats=("red_1",), key=KEY) as receiver:
-        ending = threading.Event()
-        attacker = threading.Thread(target=flood, args=(receiver.address, ending, forged("red_1"), 200.0))
-        attacker.start()
-        try:
-            with FeedSender("gps_hub", [receiver.address], KEY) as hub:
-                heard = 0
-                for _ in range(30):
-                    hub.send_positions([TRUE])
-                    hub.send_game(GAME)
-                    time.sleep(0.05)
-                    told = receiver.read()
-                    heard += len(told) == 1 and told[0].source == "gps_hub"
-        finally:
-            ending.set()
-            attacker.join()
-        assert heard >= 29
-        assert receiver.game() == GAME
-        faults = receiver.faults()
-        assert faults["unsigned"] > 100
-        assert set(faults) <= {"unsigned", "bad_signature", "socket"}
 
 
 def test_forged_packets_cost_a_tenth_so_that_more_of_them_leave_the_true_ones_room():

@@ -40,13 +40,6 @@ def test_without_the_shield_they_would():
     assert pair(shield=Unheeded()).run(20.0).closest_m < 1.0
 
 
-def test_the_policys_fault_is_told():
-    world = pair()
-    world.policy.fault, world.policy.hung = "its process died with exit code 1", True
-    world.run(0.5)
-    assert any("exit code 1" in action.text for action in world.last.actions)
-
-
 def test_telemetry_that_stops_stops_the_boat_by_its_link_and_the_other_keeps_clear():
     world = pair()
 
