@@ -84,7 +84,7 @@ def preflight(
     no_drill: Annotated[bool, o.flag("Move no boat; deploy will want the drill later.", "--no-drill")] = False,
     json_file: o.JsonFile = None,
 ) -> None:
-    """Check rates, delays, clocks, fixes, settings, geofence, certificate and disk; then drive each boat 20 s.
+    """Check rates, delays, clocks, fixes, settings, geofence, safety margins and disk; then drive each boat 20 s.
 
     Boats move in the drill, one after the other, all of them behind the shield. Exit status: 0 all pass, 1 not all, 2
     bad input, 130 interrupted.

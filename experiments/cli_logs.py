@@ -226,7 +226,7 @@ def replay(
     without_shield: Annotated[
         bool, o.flag("Also show what would have happened without the shield.", "--without-shield")
     ] = False,
-    judge: Annotated[bool, o.flag("Ask the oracle about breaches that happened (with --without-shield).")] = True,
+    judge: Annotated[bool, o.flag("Judge which hits were avoidable (with --without-shield).")] = True,
     html: Annotated[Path | None, o.flag("Write a replay to scrub in a browser; a new file."), NEW] = None,
     record: Annotated[Path | None, o.flag("Write the game's record (.npz) for render.", "--record"), NEW] = None,
     mended: Annotated[

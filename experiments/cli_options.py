@@ -54,7 +54,7 @@ NoAutopilot = Annotated[
     bool, flag("Leave boats the game drives (tagged, out of bounds) unshielded.", "--no-shield-autopilot")
 ]
 Judge = Annotated[
-    str, option("WHO", "Whose breaches the oracle judges: all, shielded (games with the shield) or none.")
+    str, option("WHO", "Whose hits are judged avoidable or not: all, shielded (games with the shield) or none.")
 ]
 Check = Annotated[bool, flag("Exit with status 1 when a goal is not met.", "--check")]
 JsonFile = Annotated[Path | None, option("FILE", "Also write the results as JSON; a new file.", "--json"), NEW]

@@ -7,7 +7,9 @@ import sys
 from pathlib import Path
 
 import pytest
+import typer
 import yaml
+from steerclear.experiments.cli import app
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -114,6 +116,19 @@ def test_retired_words_stay_out(page):
     text = text_of(page).replace("barrier certificates", "")
     found = {word: instead for word, instead in RETIRED.items() if re.search(word, text, flags=re.IGNORECASE)}
     assert not found, f"{page.name}: say instead {found}"
+
+
+def helps(command, path="steerclear"):
+    """(command, its help) of all commands."""
+    yield path, " ".join([command.help or "", *(str(getattr(each, "help", "") or "") for each in command.params)])
+    for name, each in getattr(command, "commands", {}).items():
+        yield from helps(each, f"{path} {name}")
+
+
+@pytest.mark.parametrize(("command", "text"), helps(typer.main.get_command(app)))
+def test_retired_words_stay_out_of_help(command, text):
+    found = {word: instead for word, instead in RETIRED.items() if re.search(word, text, flags=re.IGNORECASE)}
+    assert not found, f"{command}: say instead {found}"
 
 
 def test_the_site_builds_without_a_warning(tmp_path):
