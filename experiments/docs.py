@@ -24,7 +24,6 @@ from .reach.pages import played_page, sets_page, tables_page
 from .report import Report, Section, game_report, made_of
 from .tables import Table, interval_text
 from .tournament_pages import write_markdown
-from .training.study import learning_page
 
 Results = Mapping[str, Any]
 Page = tuple[str, str, list[Path]]
@@ -108,12 +107,18 @@ def _pages_of(results: Sequence[Results], folder: Path) -> tuple[dict[str, str],
     return {name: text for name, text, _ in made}, [picture for _, _, pictures in made for picture in pictures]
 
 
+def _learning_page(found: Sequence[Results], folder: Path) -> Page:
+    from .training.study import learning_page  # its training needs an extra, no other page does
+
+    return learning_page(found, folder)
+
+
 POOLED: dict[str, Callable[[Sequence[Results], Path], Page]] = {
     "encounters": comparison_page,
     "reach": lambda found, folder: ("table_cards.md", tables_page([content["card"] for content in found]), []),
     "reach-play": lambda found, folder: ("played_sets.md", played_page(found), []),
     "reach-compare": lambda found, folder: ("unsafe_sets.md", sets_page(found), []),
-    "train-study": learning_page,
+    "train-study": _learning_page,
 }
 """Commands whose results go into one page together, and what makes it."""
 
