@@ -125,7 +125,7 @@ def helps(command, path="steerclear"):
         yield from helps(each, f"{path} {name}")
 
 
-@pytest.mark.parametrize(("command", "text"), helps(typer.main.get_command(app)))
+@pytest.mark.parametrize(("command", "text"), [*helps(typer.main.get_command(app))])
 def test_retired_words_stay_out_of_help(command, text):
     found = {word: instead for word, instead in RETIRED.items() if re.search(word, text, flags=re.IGNORECASE)}
     assert not found, f"{command}: say instead {found}"
