@@ -9,7 +9,7 @@ How to call it (all arrays float64, numpy)::
     # boats: (n, 38) rows, as `Platform.pack()` gives, or a list of `Boat`
     verdict = judge(states, boats, own=0, step=123, radius_m=2.5, dt_s=0.1)          # one boat's side -> Verdict
     both = judge_breach(states, boats, (0, 3), 123, radius_m=2.5, driven=driven)      # both sides
-    many = judge_breaches(states, boats, [(123, 0, 3), ...], radius_m=2.5, progress=print)   # list[BreachVerdict]
+    many = judge_breaches(states, boats, [(123, 0, 3), ...], radius_m=2.5)   # list[BreachVerdict]
 
 - ``states`` (T+1, n, 11): every boat's full state row (columns x m, y m, heading deg, speed m/s, thrust, rudder, last
   speed error, speed integral, last heading error, heading integral, turn rate deg/s; the two errors NaN before the

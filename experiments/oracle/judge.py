@@ -16,7 +16,7 @@ that is where plans are searched. A late command changes nothing but the first s
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -79,14 +79,12 @@ def judge_breaches(
     dt_s: float = 0.1,
     driven: Any = None,
     settings: Settings = DEFAULT,
-    progress: Callable[[int, int], None] = lambda done, total: None,
     motion: Motion = AT_ONCE,
 ) -> list[BreachVerdict]:
     """Judge many separation violations of one record, each from both sides; what is not said here is as in `judge`.
 
     ``breaches``: rows (step, boat a, boat b, ...), further columns being ignored; ``driven``: (T, n) bool, whether the
-    game drove the boat in step k -> k+1, None when it never did; ``progress``: told after each how many are judged, and
-    how many there are.
+    game drove the boat in step k -> k+1, None when it never did.
 
     Raises:
         OracleError: see `judge`, or ``driven`` has another shape.
@@ -101,10 +99,9 @@ def judge_breaches(
         raise OracleError(
             f"driven is {game.dtype} of shape {game.shape}; give bool of shape {expected}, one row per step"
         )
-    for done, (step, a, b) in enumerate(rows, start=1):
+    for step, a, b in rows:
         first, second = _judge(record, a, step, b), _judge(record, b, step, a)
         verdicts.append(BreachVerdict(step, first, second, Responsible.of(first, second, game)))
-        progress(done, len(rows))
     return verdicts
 
 
