@@ -19,8 +19,8 @@ FAMILIES = ("head_on", "crossing_left", "crossing_right", "rammer_1")
 def cost(name: str, platform: str, gains: Gains, n: int = 60, seed: int = 20_260) -> tuple[int, float]:
     """Encounters breached, then commands changed: smaller is better."""
 
-    def make(*fleet: Any) -> TextbookFilter:
-        return TextbookFilter(name, *fleet[:4], gains)
+    def make(config: Any, games: int, platforms: Any, team: Any, _: Any) -> TextbookFilter:
+        return TextbookFilter(name, config, games, platforms, team, gains)
 
     figures = [measure(one, make, platform, platform, n, seed, judge=False).summary for one in FAMILIES]
     return sum(one["breached"] for one in figures), sum(one["changed_percent"] for one in figures)

@@ -116,7 +116,7 @@ class Hunt:
         ahead_m = (25.0 * u[7] - 10.0) * build.scale
         aside_deg = 140.0 * (u[5] - 0.5)
         first = S.phase(**whole, speed_mps=first_mps, lead=1.5 * u[4], angle_deg=aside_deg, standoff_m=ahead_m)
-        begin = {"at_s": first_s, "within_m": 20.0 * build.scale * u[9]}
+        begin: dict[str, Any] = {"at_s": first_s, "within_m": 20.0 * build.scale * u[9]}
         second = S.phase(**whole, speed_mps=second_mps, lead=1.5 * u[10], angle_deg=80.0 * (u[11] - 0.5), **begin)
         last = S.phase(**whole, speed_mps=top, lead=1.0, at_s=first_s + 0.4 * length_s * u[13])
         row, heading = S.script(first, second, last, authority=True), bearing + 180.0 + 180.0 * (u[2] - 0.5)
@@ -143,8 +143,8 @@ class Hunt:
             if hits[game] == 0 or self.avoidable is not None:
                 break
             found = judge_game(played, game)
-            entry = {"closest_m": float(columns["closest_m"][game]), "breaches": int(hits[game]), **found}
-            entry |= {"responsible": side_name(found["responsible"])}
+            entry: dict[str, Any] = {"closest_m": float(columns["closest_m"][game]), "breaches": int(hits[game])}
+            entry |= found | {"responsible": side_name(found["responsible"])}
             entry |= {"start_certificate_m": float(start_certificate_m(played)[game])}
             self.judged.append(entry)
             if found["avoidable"]:

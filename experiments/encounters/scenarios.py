@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from difflib import get_close_matches
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from steerclear.shield.exceptions import ConfigError
@@ -168,7 +168,7 @@ def ram(build: SceneBuilder, reach: float = 1.0) -> None:
     It starts up to ``reach`` times as far away as others do.
     """
     kind = float(build.rng.random())
-    attack: dict[str, float] = {"aim": S.AIM_TARGET, "speed_mps": build.other_mps}
+    attack: dict[str, Any] = {"aim": S.AIM_TARGET, "speed_mps": build.other_mps}
     close = build.uniform(4.0, 12.0) * build.scale + build.radius_m - 2.5
     if kind < 0.2:
         phases = [S.phase(**attack)]
