@@ -179,8 +179,10 @@ def checks_of(session: VehicleSession, minutes: float) -> list[Check]:
             tracker.update(session.clock.now_s(), readings, session.contacts())
         return tracker
 
-    situation = [Check(name, lambda name=name: check_situation(name, fleet, tracker(), fixed)) for name in SITUATION]
-    return [disk, *links, *situation]
+    def situation(name: str) -> CheckResult:
+        return check_situation(name, fleet, tracker(), fixed)
+
+    return [disk, *links, *(Check(name, partial(situation, name)) for name in SITUATION)]
 
 
 def deploy(orders: Orders, surface: Surface | None = None, operator: Operator | None = None) -> Outcome:

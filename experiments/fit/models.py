@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from steerclear.shield.jit import Array
@@ -165,7 +166,7 @@ class Model:
 
 def _rate(v: dict[str, float], name: str, top_mps: float) -> Platform:
     gains = Gains(kp=v["kp"])
-    rest = {key: value for key, value in v.items() if key not in ("kp", "delay_s")}
+    rest: dict[str, Any] = {key: value for key, value in v.items() if key not in ("kp", "delay_s")}
     return Platform(name=name, kind="rate", max_speed_mps=top_mps, heading_pid=gains, **rest)
 
 
