@@ -93,3 +93,51 @@ def test_names_until_0_8_0_warn_and_give_the_same():
             assert getattr(played, old) is getattr(played, new)
     with pytest.raises(AttributeError, match="no 'told'"):
         _ = played.told
+
+
+def test_a_shielded_film_repeats_bit_for_bit():
+    scenes = short(draw("rammer_1", "heron", "heron", USUAL, 5, 0, 3), 8.0)
+    films = [play(scenes, "shield", USUAL) for _ in range(2)]
+    np.testing.assert_array_equal(films[0].state, films[1].state)
+    assert (films[0].filtered != films[0].nominal).any()
+    np.testing.assert_array_equal(films[0].filtered[:, :, 1], films[0].nominal[:, :, 1])
+
+
+def test_a_delayed_command_is_relative_to_the_heading_it_was_given_at():
+    scenes = short(draw("head_on", "heron", "heron", USUAL, 1, 0, 1), 12.0)
+    film = play(scenes, _Turner(), Conditions(delay_s=0.4))
+    assert film.state[-1, 0, 0, L.HEADING] == pytest.approx(_Turner.heading, abs=1.0)
+
+
+class _Turner:
+    """Commands one absolute heading, as a relative one."""
+
+    heading = 50.0
+    reason, safety_margin_m = np.zeros((1, 2), np.int64), np.zeros((1, 2))
+
+    def decide(self, state, wanted, ours):
+        sent = wanted.copy()
+        sent[0, 0, 1] = (self.heading - state[0, 0, L.HEADING] + 180.0) % 360.0 - 180.0
+        return sent
+
+
+def test_the_current_carries_every_boat_alike():
+    still = short(draw("cluster", "heron", "heron", USUAL, 1, 0, 2))
+    conditions = Conditions(current_mps=0.4)
+    film = play(still, lambda *made: Recording(2, 6, 0.0, 0.0), conditions)
+    bare = play(still, lambda *made: Recording(2, 6, 0.0, 0.0), USUAL)
+    drift = film.state[-1, :, :, :2] - bare.state[-1, :, :, :2]
+    np.testing.assert_allclose(drift, np.broadcast_to(0.4 * 6.0 * still.current[:, None], drift.shape), atol=1e-9)
+
+
+def test_position_errors_stay_within_the_bound_and_truth_is_untouched():
+    conditions = Conditions(noise_m=0.8)
+    scenes = short(draw("crowd_6", "heron", "heron", conditions, 1, 0, 4), 20.0)
+    guard = Recording(4, 6)
+    film = play(scenes, guard, conditions)
+    seen = np.array(guard.seen)
+    error = np.linalg.norm(seen[..., :2] - film.state[:-1, ..., :2], axis=-1)
+    assert error.max() <= 0.8 + 1e-9
+    assert error.max() > 0.7
+    assert 0.2 < error.mean() < 0.6
+    np.testing.assert_array_equal(seen[..., 2:], film.state[:-1, ..., 2:])

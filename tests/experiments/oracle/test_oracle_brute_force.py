@@ -72,6 +72,17 @@ def test_brute_force_finds_nothing_more(name, size_m):
     assert sum(found) > 3
 
 
+@pytest.mark.study
+@pytest.mark.parametrize(
+    ("name", "size_m", "macro", "back"),
+    [("heron", 12.0, 3, 8), ("surveyor", 20.0, 8, 25), ("large_usv", 60.0, 4, 12), ("di", 25.0, 5, 12)],
+)
+def test_large_brute_force_finds_nothing_more(name, size_m, macro, back):
+    rudders = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
+    found = [compare(name, seed, size_m, rudders, macro, most=3, back=back) for seed in range(100, 160)]
+    assert sum(found) > 10
+
+
 @pytest.mark.parametrize("name", ["heron", "surveyor", "mctf2024_sim", "large_usv", "si", "di"])
 def test_plans_hold_when_replayed_with_the_packages_boat(name):
     size_m = {"large_usv": 100.0, "si": 60.0, "di": 60.0}.get(name, 35.0)
@@ -98,3 +109,19 @@ def _apart(states, verdict):
     begin = states[verdict.last_step]
     others = np.delete(begin[:, :2], verdict.own, axis=0)
     return np.hypot(*(others - begin[verdict.own, :2]).T).min() > RADIUS_M
+
+
+@pytest.mark.parametrize("name", ["heron", "surveyor"])
+def test_what_cannot_be_avoided_cannot_be_on_a_finer_search(name):
+    # one step after the last preventable moment nothing was found: nothing is found there by a finer search either
+    later = []
+    for seed in range(8):
+        states, rows, breaches = close_calls(name, seed, {"heron": 18.0, "surveyor": 25.0}[name])
+        if not breaches:
+            continue
+        step, a, b = (int(value) for value in breaches[0][:3])
+        coarse = judge(states, rows, a, step, RADIUS_M, other=b, settings=Settings(look_back_s=8.0))
+        fine = judge(states, rows, a, step, RADIUS_M, other=b, settings=Settings(look_back_s=8.0, full=FINER))
+        later.append((fine.last_step or -1) - (coarse.last_step or -1))
+        assert (fine.outcome, abs(later[-1]) <= 2) == (coarse.outcome, True)
+    assert len(later) >= 2

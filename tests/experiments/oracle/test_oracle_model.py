@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from steerclear.env.trace import load_trace
 from steerclear.experiments.oracle.boat_model import DOWN, HOLD, UP, command_of, rows_of, step
 from steerclear.shield.platforms import PLATFORMS, fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L
@@ -35,6 +36,41 @@ def test_same_steps_as_the_package(name, dt_s):
         ours[L.HEADING] = theirs[L.HEADING]
         np.testing.assert_allclose(ours, theirs, atol=1e-7)
     assert np.ptp([ours[L.X], ours[L.Y], 3.0]) > 1.0
+
+
+@pytest.mark.parametrize("stem", PLAIN)
+def test_same_steps_as_the_recorded_simulator(stem):
+    trace = load_trace(TRACES / f"{stem}.npz")
+    arrays, names = trace.arrays, trace.meta["dynamics"]
+    names = [names] * arrays["position"].shape[1] if isinstance(names, str) else names
+    compared = 0
+    for boat, name in enumerate(names):
+        free = ~(arrays["oob"] | arrays["is_tagged"])[:, boat].astype(bool)
+        steps = int(np.argmin(free)) - 1 if not free.all() else trace.steps
+        steps = min(steps, 400)
+        compared += _follow(arrays, boat, get_platform(name).pack(), steps, trace.meta["dt"])
+    assert compared > 100
+
+
+def _follow(arrays, boat, params, steps, dt_s):
+    """Drive a boat from the record's start by its actions; returns how many steps the record could be followed."""
+    numbers = rows_of([params])[0]
+    state = fresh_state(*arrays["position"][0, boat], arrays["heading"][0, boat], arrays["speed"][0, boat])
+    for k in range(steps):
+        speed_mps, error_deg = arrays["action"][k, boat]
+        if np.isnan(error_deg):
+            return 0
+        moved = np.linalg.norm(arrays["position"][k + 1, boat] - arrays["position"][k, boat])
+        if moved > 1.5 * max(params[L.MAX_SPEED], 0.1) * dt_s or _near_flag(arrays, k, boat):
+            return k
+        step(numbers, state, np.float64(np.float32(speed_mps)), np.float64(np.float32(error_deg)), dt_s)
+        np.testing.assert_allclose(state[:2], arrays["position"][k + 1, boat], atol=2e-5)
+    return max(steps, 0)
+
+
+def _near_flag(arrays, k, boat):
+    gaps = np.linalg.norm(arrays["flag_position"][k + 1] - arrays["position"][k + 1, boat], axis=-1)
+    return gaps.min() < 6.0
 
 
 @settings(max_examples=60, deadline=None)
