@@ -276,7 +276,7 @@ def part_of(scene: Scene, static: Static, first: int, last: int, delay: int) -> 
     part = new_scene(last - first, scene.boats, static, scene.tuning, delay)
     hints = get_type_hints(Scene, include_extras=True)
     of_all = [name for name, hint in hints.items() if "B" in get_args(hint)]
-    return share(part._tuple._replace(**{name: getattr(scene, name)[first:last] for name in of_all}))
+    return share(part._replace(**{name: getattr(scene, name)[first:last] for name in of_all}))
 
 
 def new_memory(decisions: int, boats: int) -> Array:
