@@ -1,18 +1,28 @@
-"""Arrays as compiled code takes them: whatever is handed over becomes one type and one layout, or is refused."""
+"""Arrays that are handed over: they become one type and one layout, or are refused; likely mistakes of units are told.
+
+Compiled code would be compiled anew for each other kind of array, and would round in whole numbers.
+"""
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
+from .exceptions import FleetError
 from .jit import Array, BoolArray, IntArray
+
+_LOG = logging.getLogger(__name__)
 
 LARGEST_WHOLE = 2**53
 """Whole numbers given as floats are exact up to here."""
 
-_NUMERIC = "iufb"
-_BOOLS = ("bool", "torch.bool")
+MOST_RAD = 10.0
+"""Headings beyond this are hardly radians: a heading of a turn and a half, plus rounding."""
+
+_said: set[str] = set()
 
 
 class NoNumbersError(ValueError):
@@ -20,15 +30,11 @@ class NoNumbersError(ValueError):
 
 
 def numbers(value: Any, bools: bool = False) -> Array:
-    """Numbers of any kind as an array that compiled code knows: float64, C order, aligned, writeable.
-
-    Such an array is handed on as it is; of any other (lists, tensors, whole numbers, float32, strided or read-only
-    views) a copy is made. Compiled code would be compiled anew for each other kind, and would round in whole numbers.
+    """Numbers of any kind as float64, C order, aligned, writeable; an array that is so already is handed on as it is.
 
     Args:
-        value: numbers.
-        bools: True and False are 1 and 0; else they are no numbers: a mask or a flag in the place of a speed or heading
-            is a mistake.
+        value: numbers, in lists, arrays, tensors; None is NaN.
+        bools: True and False are 1 and 0; else they are no numbers: a mask in the place of a speed is a mistake.
 
     Raises:
         NoNumbersError: it holds something else: texts, complex numbers, masked values, rows of unlike length.
@@ -39,15 +45,6 @@ def numbers(value: Any, bools: bool = False) -> Array:
     if not bools and (found.dtype == np.bool_ or holds_bools(value)):
         raise NoNumbersError("some are True or False")
     return np.require(found, np.float64, ["C", "A", "W"])
-
-
-def holds_bools(value: Any) -> bool:
-    """Whether an entry is True or False, Python's, numpy's or a tensor's, at any depth of lists and tuples."""
-    if type(value) in (list, tuple):
-        return any(map(holds_bools, value))
-    if isinstance(value, np.ndarray) and value.dtype.kind == "O":
-        return any(map(holds_bools, value.flat))
-    return isinstance(value, bool) or str(getattr(value, "dtype", None)) in _BOOLS
 
 
 def truths(value: Any) -> BoolArray:
@@ -74,14 +71,44 @@ def whole_numbers(value: Any) -> IntArray:
     if type(value) is np.ndarray and value.dtype == np.int64 and value.flags.carray:
         return value
     found = _plain(value)
-    if found.dtype.kind == "f" and found.size:
-        if not (np.isfinite(found).all() and (found == np.round(found)).all()):
-            raise NoNumbersError(f"a value that is not a whole number: {_short(found)}")
-        if np.abs(found).max() > LARGEST_WHOLE:
-            raise NoNumbersError(f"a number too large to be told from its neighbours: {_short(found)}")
-    if found.dtype.kind == "u" and found.size and found.max() > np.iinfo(np.int64).max:
-        raise NoNumbersError(f"a number beyond 64 bits: {_short(found)}")
+    if found.dtype.kind == "f" and not (np.isfinite(found).all() and (found == np.round(found)).all()):
+        raise NoNumbersError(f"a value that is not a whole number: {_short(found)}")
+    most = LARGEST_WHOLE if found.dtype.kind == "f" else np.iinfo(np.int64).max
+    if found.dtype.kind in "fu" and (np.abs(found) > most).any():
+        raise NoNumbersError(f"a number too large to be told from its neighbours: {_short(found)}")
     return np.require(found, np.int64, ["C", "A", "W"])
+
+
+_SORTS: dict[Callable[[Any], Any], str] = {numbers: "numbers", truths: "True or False", whole_numbers: "whole numbers"}
+
+
+def shaped(name: str, value: Any, shape: tuple[int | None, ...], brought: Callable[[Any], Any] = numbers) -> Any:
+    """An array of that shape (None matches any length), as compiled code takes it; nothing at all fits any.
+
+    Raises:
+        FleetError: it is none; ``name`` says of what.
+    """
+    expected = tuple("n" if size is None else size for size in shape)
+    try:
+        array = brought(value)
+    except NoNumbersError as error:
+        raise FleetError(
+            f"{name} is not an array of {_SORTS[brought]} ({error}); give one of shape {expected}"
+        ) from None
+    if array.shape == (0,) and shape[0] in (None, 0):
+        array = array.reshape(0, *(size or 0 for size in shape[1:]))
+    if array.ndim != len(shape) or any(w not in (None, g) for w, g in zip(shape, array.shape, strict=True)):
+        raise FleetError(f"{name} has shape {array.shape}; expected {expected}")
+    return array
+
+
+def holds_bools(value: Any) -> bool:
+    """Whether an entry is True or False, Python's, numpy's or a tensor's, at any depth of lists and tuples."""
+    if type(value) in (list, tuple):
+        return any(map(holds_bools, value))
+    if isinstance(value, np.ndarray) and value.dtype.kind == "O":
+        return any(map(holds_bools, value.flat))
+    return isinstance(value, bool) or str(getattr(value, "dtype", None)) in ("bool", "torch.bool")
 
 
 def _plain(value: Any) -> np.ndarray:
@@ -91,26 +118,16 @@ def _plain(value: Any) -> np.ndarray:
         if np.ma.is_masked(value):
             raise NoNumbersError("some values are masked; fill them in")
         if found.dtype.kind == "O":
-            found = _of_objects(found)
+            if any(isinstance(entry, (str, bytes)) for entry in found.flat):
+                raise NoNumbersError("some are texts")
+            found = np.array([np.nan if entry is None else float(entry) for entry in found.flat]).reshape(found.shape)
     except NoNumbersError:
         raise
     except Exception as error:  # what is handed over may be anything, and raise anything
         raise NoNumbersError(_short(error)) from None
-    if found.dtype.kind not in _NUMERIC:
+    if found.dtype.kind not in "iufb":
         raise NoNumbersError(f"they are {'texts' if found.dtype.kind in 'US' else found.dtype}")
     return found
-
-
-def _of_objects(found: np.ndarray) -> np.ndarray:
-    """Python's own numbers, as large whole ones; None is NaN."""
-    entries = [_without_gradient(entry) for entry in found.flat]
-    if any(isinstance(entry, (str, bytes)) for entry in entries):
-        raise NoNumbersError("some are texts")
-    if entries and all(isinstance(entry, int) for entry in entries):
-        if any(abs(entry) > np.iinfo(np.int64).max for entry in entries):
-            raise NoNumbersError(f"a number beyond 64 bits: {_short(entries)}")
-        return np.array(entries, np.int64).reshape(found.shape)
-    return np.array([np.nan if entry is None else float(entry) for entry in entries]).reshape(found.shape)
 
 
 def _without_gradient(value: Any) -> Any:
@@ -120,11 +137,24 @@ def _without_gradient(value: Any) -> Any:
     if not hasattr(value, "detach"):
         return value
     plain = value.detach().cpu()
-    if plain.is_floating_point():
-        plain = plain.double()  # numpy knows no bfloat16
-    return plain.numpy()
+    return (plain.double() if plain.is_floating_point() else plain).numpy()  # numpy knows no bfloat16
 
 
 def _short(what: object, length: int = 120) -> str:
     text = " ".join(str(what.tolist() if isinstance(what, np.ndarray) else what).split())
     return text if len(text) <= length else text[: length - 1] + "…"
+
+
+def say_once(topic: str, words: str) -> None:
+    """Log a warning, the first time a topic comes up in this process."""
+    if topic not in _said:
+        _said.add(topic)
+        _LOG.warning(words)
+
+
+def hint_at_degrees(what: str, heading_rad: Array, remedy: str) -> None:
+    """Say so, once, if headings in rad look like degrees."""
+    largest = np.abs(heading_rad).max(initial=0.0, where=np.isfinite(heading_rad))
+    if largest > MOST_RAD:
+        turns = largest / (2.0 * np.pi)
+        say_once(what, f"{what} holds {largest:g} rad, {turns:.3g} turns; if these are degrees {remedy}")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
 from . import workspace as W
-from .arrays import NoNumbersError, numbers, truths, whole_numbers
+from .arrays import NoNumbersError, shaped, truths, whole_numbers
 from .config import ShieldConfig
 from .decide import Deciders
 from .exceptions import ConfigError, FleetError
@@ -19,7 +19,7 @@ from .masks import passing
 from .model import boats_of
 from .platforms import Platform
 from .platforms import layout as L
-from .shield import barriers_of
+from .shield import NOMINAL, barriers_of, write_seen
 from .surroundings import OPEN_WATER, Surroundings
 
 
@@ -65,8 +65,10 @@ class BatchedShield:
         for name, number in (("games", games), ("threads", threads)):
             if isinstance(number, bool) or not isinstance(number, (int, np.integer)) or number < 1:
                 raise ConfigError(f"{name} is {number!r}; give a whole number >= 1")
+        if isinstance(platforms, (str, Platform)) or not isinstance(platforms, Iterable):
+            raise ConfigError(f"platforms is {platforms!r}; give a list of them, one for each boat")
         self.config, self.flag_of, self.surroundings = config, flag_of, surroundings
-        self.platforms, self.team = _kinds(platforms), _teams(team)
+        self.platforms, self.team = tuple(platforms), _teams(team)
         if len(self.platforms) != len(self.team) or not self.platforms:
             raise ConfigError(
                 f"{len(self.platforms)} platforms and {len(self.team)} team entries; give one of each per boat"
@@ -76,6 +78,7 @@ class BatchedShield:
         self._static = surroundings.pack(config, self._barriers.arrays)
         self._deciders = Deciders(config, games, boats, self._static, solver_of(config.solver), threads)
         scene = self._deciders.scene
+        scene.given[:, :, W.HORIZON_S] = np.nan
         self.sent, self.reason = scene.sent, scene.reasons
         self.serves: int | None = None
 
@@ -90,9 +93,9 @@ class BatchedShield:
         return np.asarray((self._deciders.scene.told[:, :, W.CUT_SHORT] != 0.0).any(axis=1))
 
     @property
-    def remembered(self) -> dict[str, np.ndarray]:
+    def remembered(self) -> dict[str, Array]:
         """What goes on from decision to decision, by name: live arrays, (B, ...). Copies written back go on there."""
-        return {"memory": self._deciders.scene.memories, "pending": self._deciders.scene.pending}
+        return self._deciders.remembered
 
     def reset(self, mask: BoolArray | None = None) -> None:
         """Forget the backups of the games in ``mask`` (B,) of True and False, or of all.
@@ -100,8 +103,13 @@ class BatchedShield:
         Raises:
             FleetError: the mask is no such array.
         """
-        which = slice(None) if mask is None else _mask(mask, len(self.reason))
-        self.serves = None if mask is None else self.serves
+        which: slice | BoolArray = slice(None)
+        if mask is None:
+            self.serves = None
+        else:
+            which, games = np.asarray(mask), len(self.reason)
+            if which.dtype != np.bool_ or which.shape != (games,):
+                raise FleetError(f"mask is {which.dtype} of shape {which.shape}; give bool of shape ({games},)")
         self._deciders.forget(which)
 
     def decide(
@@ -131,30 +139,13 @@ class BatchedShield:
         Raises:
             FleetError: an array has the wrong shape or holds no numbers, or a state is not finite.
         """
-        wanted = _shaped("wanted", wanted, (*self.reason.shape, 2), numbers)
+        wanted = shaped("wanted", wanted, (*self.reason.shape, 2))
         self._give(state, ours, visiting, driven)
-        self._deciders.scene.given[:, :, W.NOMINAL_SPEED : W.NOMINAL_TURN + 1] = wanted
+        self._deciders.scene.given[:, :, NOMINAL] = wanted
         self._barriers.renew()
         self._deciders.decide(self._static)
         self._barriers.tell()
         return self.sent
-
-    def _give(self, state: Array, ours: BoolArray, visiting: BoolArray | None, driven: Array | None) -> None:
-        """Write all but the commands into the scene.
-
-        Raises:
-            FleetError: see `decide`.
-        """
-        games, given = self.reason.shape, self._deciders.scene.given
-        state, ours = _shaped("state", state, (*games, L.N_STATE), numbers), _shaped("ours", ours, games, truths)
-        if not (np.abs(state[:, :, : L.SPEED_ERROR]) <= LARGEST).all() or (np.abs(state) > LARGEST).any():
-            raise FleetError(f"a boat's position, heading, speed, thrust or rudder is not finite or beyond {LARGEST:g}")
-        if (np.abs(state[:, :, L.SPEED]) > LARGEST_SPEED_MPS).any():
-            raise FleetError(f"a boat's speed is beyond {LARGEST_SPEED_MPS:g} m/s; no boat of a game goes so fast")
-        given[:, :, : L.N_STATE], given[:, :, W.OURS] = state, ours
-        given[:, :, W.VISITING] = False if visiting is None else _shaped("visiting", visiting, games, truths)
-        given[:, :, W.DRIVEN :] = np.nan if driven is None else _shaped("driven", driven, (*games, 4), numbers)
-        given[:, :, W.HORIZON_S] = np.nan
 
     def safe_actions(
         self,
@@ -177,14 +168,25 @@ class BatchedShield:
             FleetError: no candidates, or as `decide`.
         """
         self._give(state, ours, visiting, driven)
-        asked = np.shape(actions)
-        if len(asked) != 4 or asked[2] < 1:
-            raise FleetError(f"actions has shape {asked}; expected {(*self.reason.shape, 'k', 2)}, k one at least")
-        candidates = _shaped("actions", actions, (*self.reason.shape, asked[2], 2), numbers)
+        candidates = shaped("actions", actions, (*self.reason.shape, None, 2))
+        if candidates.shape[2] < 1:
+            raise FleetError("actions hold no candidate; give one at least for each boat")
         self._barriers.renew()
         passes = passing(self._deciders, self._static, candidates)
         self._barriers.tell()
         return passes
+
+    def _give(self, state: Array, ours: BoolArray, visiting: BoolArray | None, driven: Array | None) -> None:
+        """Write all but the commands into the scene."""
+        games = self.reason.shape
+        state, ours = shaped("state", state, (*games, L.N_STATE)), shaped("ours", ours, games, truths)
+        visiting = None if visiting is None else shaped("visiting", visiting, games, truths)
+        driven = None if driven is None else shaped("driven", driven, (*games, 4))
+        if not (np.abs(state[:, :, : L.SPEED_ERROR]) <= LARGEST).all() or (np.abs(state) > LARGEST).any():
+            raise FleetError(f"a boat's position, heading, speed, thrust or rudder is not finite or beyond {LARGEST:g}")
+        if (np.abs(state[:, :, L.SPEED]) > LARGEST_SPEED_MPS).any():
+            raise FleetError(f"a boat's speed is beyond {LARGEST_SPEED_MPS:g} m/s; no boat of a game goes so fast")
+        write_seen(self._deciders.scene.given, state, ours, visiting, driven)
 
     def filter_for(self, team: int, shield_autopilot: bool = True) -> Any:
         """Command filter for a batched game: ``step(actions, command_filter=shield.filter_for(0))``.
@@ -204,34 +206,6 @@ class BatchedShield:
         from .wrappers.games_shield import GamesFilter
 
         return GamesFilter(self, team, shield_autopilot)
-
-
-def _shaped(name: str, value: Any, shape: tuple[int, ...], brought: Callable[[Any], Any]) -> Any:
-    """An array of that shape, as compiled code takes it.
-
-    Raises:
-        FleetError: it is not.
-    """
-    try:
-        array = brought(value)
-    except NoNumbersError as error:
-        raise FleetError(f"{name} is not usable ({error}); expected an array of shape {shape}") from None
-    if array.shape != shape:
-        raise FleetError(f"{name} has shape {array.shape}; expected {shape}")
-    return array
-
-
-def _mask(mask: Any, games: int) -> BoolArray:
-    found = np.asarray(mask)
-    if found.dtype != np.bool_ or found.shape != (games,):
-        raise FleetError(f"mask is {found.dtype} of shape {found.shape}; give bool of shape ({games},)")
-    return found
-
-
-def _kinds(platforms: Any) -> tuple[str | Platform, ...]:
-    if isinstance(platforms, (str, Platform)) or not isinstance(platforms, Iterable):
-        raise ConfigError(f"platforms is {platforms!r}; give a list of them, one for each boat")
-    return tuple(platforms)
 
 
 def _teams(team: Any) -> tuple[int, ...]:

@@ -11,11 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import NoNumbersError, numbers
+from .arrays import hint_at_degrees, say_once, shaped
 from .exceptions import FleetError
-from .hints import hint_at_headings, hint_at_speed
-from .jit import Array, BoolArray, IntArray
-from .workspace import LARGEST_COMMAND, LIMITED, PASSED
+from .jit import Array, BoolArray
+from .workspace import LARGEST_COMMAND
 
 ROUNDING_MPS = 1e-6
 """A speed beyond the limit by less is that limit, rounded: it passes as it is."""
@@ -47,54 +46,35 @@ class Commands:
     of_game: bool = False
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "values", _as_commands(self.values))
+        object.__setattr__(self, "values", _rows(self.values))
         if not isinstance(self.relative, (bool, np.bool_)):
             raise FleetError(
                 f"relative is {self.relative!r}; give True or False, or build commands with Commands.absolute_rad, "
                 "absolute_deg or relative_deg"
             )
         if not self.relative:
-            hint_at_headings(
-                "Commands.absolute_rad",
-                self.values[:, 1],
-                "give Commands.absolute_deg; rows are (speed m/s, heading), in this order",
-            )
+            remedy = "give Commands.absolute_deg; rows are (speed m/s, heading), in this order"
+            hint_at_degrees("Commands.absolute_rad", self.values[:, 1], remedy)
 
     @classmethod
     def relative_deg(cls, values: ArrayLike) -> Commands:
-        """Commands to turn: (n, 2) of speed m/s and heading deg relative to the boat's own, clockwise.
-
-        Raises:
-            FleetError: the shape is wrong or the values are not numbers.
-        """
-        return cls(_as_commands(values).copy(), True)
+        """Commands to turn: (n, 2) of speed m/s and heading deg relative to the boat's own, clockwise."""
+        return cls(_rows(values).copy(), True)
 
     @classmethod
     def game_deg(cls, values: ArrayLike) -> Commands:
-        """Commands of a game, which limits speeds itself: (n, 2) of speed m/s and relative heading deg, clockwise.
-
-        Raises:
-            FleetError: the shape is wrong or the values are not numbers.
-        """
-        return cls(_as_commands(values).copy(), True, True)
+        """Commands of a game, which limits speeds itself: (n, 2) of speed m/s and relative heading deg, clockwise."""
+        return cls(_rows(values).copy(), True, True)
 
     @classmethod
     def absolute_rad(cls, values: ArrayLike) -> Commands:
-        """Commands as boats take them: (n, 2) of speed m/s and heading rad, clockwise from north.
-
-        Raises:
-            FleetError: the shape is wrong or the values are not numbers.
-        """
-        return cls(_as_commands(values).copy(), False)
+        """Commands as boats take them: (n, 2) of speed m/s and heading rad, clockwise from north."""
+        return cls(_rows(values).copy(), False)
 
     @classmethod
     def absolute_deg(cls, values: ArrayLike) -> Commands:
-        """The same from degrees: (n, 2) of speed m/s and heading deg, clockwise from north. They are kept in rad.
-
-        Raises:
-            FleetError: the shape is wrong or the values are not numbers.
-        """
-        array = _as_commands(values).copy()
+        """The same from degrees: (n, 2) of speed m/s and heading deg, clockwise from north. They are kept in rad."""
+        array = _rows(values).copy()
         with np.errstate(invalid="ignore"):  # infinite ones become NaN, and the shield holds the boat
             array[:, 1] = np.radians(np.fmod(array[:, 1], 360.0))
         return cls(array, False)
@@ -122,58 +102,43 @@ class Commands:
 
     def replaced(self, changed: BoolArray, relative: Array, heading_deg: Array) -> Commands:
         """These commands with the rows of ``changed`` taken from ``relative`` (speed m/s, relative deg)."""
-        values = self.values.copy()
-        rows = relative[changed]
+        values, rows = self.values.copy(), relative[changed]
         if not self.relative:
             rows = np.stack([rows[:, 0], np.radians(heading_deg[changed] + rows[:, 1])], axis=1)
         values[changed] = rows
         return replace(self, values=values)
 
-    def within(self, rows: BoolArray, highest_mps: Array) -> Commands:
-        """These commands with the speeds of ``rows`` brought into 0 to (n,) m/s, and relative headings into a turn."""
+    def within(
+        self, names: tuple[str, ...], controlled: BoolArray, highest_mps: Array
+    ) -> tuple[Commands, BoolArray | None]:
+        """These commands with speeds of own boats that their platforms do (n,), m/s, and (n,) which are cut, if any.
+
+        No platform is sent astern: none has a speed below 0 in its model. What is no command at all (not finite, or
+        beyond `LARGEST_COMMAND`) is left to the decision, which holds those boats.
+        """
+        if self.of_game or len(self) == 0:
+            return self, None
+        speed = self.values[:, 0]
+        beyond = (speed > highest_mps + ROUNDING_MPS) | (speed < -ROUNDING_MPS)
+        cut: BoolArray = controlled & beyond & (np.abs(self.values) <= LARGEST_COMMAND).all(axis=1)
+        if not cut.any():
+            return self, None
+        first = int(np.argmax(cut))
+        say_once(
+            "speed",
+            f"a speed of {speed[first]:g} m/s is wanted of boat {names[first]!r}, whose platform does 0 to "
+            f"{highest_mps[first]:g} m/s; it is cut to that (reason LIMITED). Rows are (speed m/s, heading), in this "
+            "order",
+        )
         values = self.values.copy()
-        values[rows, 0] = np.clip(values[rows, 0], 0.0, highest_mps[rows])
+        values[cut, 0] = np.clip(speed[cut], 0.0, highest_mps[cut])
         if self.relative:
-            far = rows & (np.abs(values[:, 1]) > 180.0)
+            far = cut & (np.abs(values[:, 1]) > 180.0)
             half = np.copysign(180.0, values[far, 1])
             values[far, 1] = np.fmod(values[far, 1] + half, 360.0) - half
-        return replace(self, values=values)
+        return replace(self, values=values), cut
 
 
-def _as_commands(values: ArrayLike) -> Array:
-    """Commands as compiled code takes them; such ones are not copied."""
-    try:
-        array = numbers(values)
-    except NoNumbersError as error:
-        raise FleetError(f"commands are not numbers ({error}); give an (n, 2) array of speed and heading") from None
-    if array.shape == (0,):
-        array = array.reshape(0, 2)
-    if array.ndim != 2 or array.shape[1] != 2:
-        raise FleetError(f"commands have shape {array.shape}; give (n, 2): speed m/s and heading per boat")
-    return array
-
-
-def within_limits(
-    wanted: Commands, names: tuple[str, ...], controlled: BoolArray, highest: Array
-) -> tuple[Commands, BoolArray | None]:
-    """Nominal commands of own boats, with speeds their platforms do (n,), m/s, and (n,) which are cut, if any.
-
-    No platform is sent astern: none has a speed below 0 in its model. What is no command at all
-    (not finite, or beyond `LARGEST_COMMAND`) is left to the decision, which holds those boats.
-    """
-    if wanted.of_game or len(wanted) == 0:
-        return wanted, None
-    speed = wanted.values[:, 0]
-    beyond = (speed > highest + ROUNDING_MPS) | (speed < -ROUNDING_MPS)
-    cut: BoolArray = controlled & beyond & (np.abs(wanted.values) <= LARGEST_COMMAND).all(axis=1)
-    if not cut.any():
-        return wanted, None
-    first = int(np.argmax(cut))
-    hint_at_speed(names[first], float(speed[first]), float(highest[first]))
-    return wanted.within(cut, highest), cut
-
-
-def tell_of_limits(cut: BoolArray, changed: BoolArray, reason: IntArray) -> BoolArray:
-    """Name the reason of commands that were cut and nothing else; returns (n,) which are not what was wanted."""
-    reason[cut & (reason == PASSED)] = LIMITED
-    return changed | cut
+def _rows(values: ArrayLike) -> Array:
+    rows: Array = shaped("array of commands (speed m/s, heading)", values, (None, 2))
+    return rows

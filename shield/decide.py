@@ -330,6 +330,11 @@ class Deciders:
     def __getstate__(self) -> dict[str, Any]:
         return self.__dict__ | {"_decide_all": None, "_parts": [], "_pool": None}  # those are of one process
 
+    @property
+    def remembered(self) -> dict[str, Array]:
+        """What goes on from decision to decision, by name: live arrays, (B, ...)."""
+        return {"memory": self.scene.memories, "pending": self.scene.pending}
+
     def forget(self, which: slice | BoolArray) -> None:
         """Forget the backups of some deciders, and the commands on their way."""
         memories, pending = self.scene.memories, self.scene.pending

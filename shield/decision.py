@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
 from enum import IntEnum
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 
@@ -90,10 +90,10 @@ class Decision:
             decisions read from a black box.
         cut_short: whether the search for this boat's command was ended by `ShieldConfig.work_budget`: what is sent is
             the best that was verified until then.
-        solver: what found a `LEAST_CHANGE`, "qp" or "line_search"; None: of another reason, or not known.
-        outside_m: how far outside the field's edge the boat is, m; 0 inside, or where there is no field.
         adversary_horizon_s: how long from now this boat, an opponent, was taken to do its worst before it holds its
             course, s (0: it holds it from now on, or its way is known). None: it is no opponent, or not known.
+        outside_m: how far outside the field's edge the boat is, m; 0 inside, or where there is no field.
+        solver: what found a `LEAST_CHANGE`, "qp" or "line_search"; None: of another reason, or not known.
     """
 
     boat: str
@@ -115,7 +115,7 @@ class Decision:
     solver: str | None = None
 
     def __eq__(self, other: object) -> bool:
-        return self._said() == other._said() if isinstance(other, Decision) else NotImplemented
+        return isinstance(other, Decision) and self._said() == other._said()
 
     def __hash__(self) -> int:
         return hash(self._said())
@@ -125,31 +125,20 @@ class Decision:
         values = (getattr(self, entry.name) for entry in fields(self) if entry.compare)
         return tuple(None if value != value else value for value in values)
 
+    def _cells(self) -> tuple[str, ...]:
+        wanted = f"{math.degrees(self.nominal_heading_rad) % 360.0:.1f}", f"{self.nominal_speed_mps:.2f}"
+        sent = f"{math.degrees(self.filtered_heading_rad) % 360.0:.1f}", f"{self.filtered_speed_mps:.2f}"
+        margin = "-" if math.isinf(self.safety_margin_m) else f"{self.safety_margin_m:.2f}"
+        return (self.boat, *wanted, *sent, self.reason.name, ", ".join(self.active_constraints) or "-", margin)
+
 
 @accepts_old_names(DECISIONS)
 @dataclass(frozen=True)
-class Decisions(Sequence[Decision]):
+class Decisions:
     """Decisions for all boats of a fleet, in its order; indexing, by place or name, builds the `Decision` of one boat.
 
     ``decisions[0]`` is that of the fleet's first boat, ``decisions["boat_0"]`` that of the boat of this name, and
     ``"boat_0" in decisions`` tells whether there is one. `filtered` and the other arrays have all boats at once.
-
-    Attributes:
-        fleet: the fleet decided on.
-        nominal, filtered: commands, in the same frame.
-        intervened: (n,) bool.
-        reason: (n,) values of `Reason`.
-        safety_margin_m: (n,) margins, m.
-        slack_m: (n,) m.
-        bound: (n,) index of the binding neighbour, -1 none, -2 static constraints, -3 and below ``barriers``.
-        solve_time_s: time of the whole decision, s.
-        no_table: (n, n) pairs of own boat and opponent whose value table is missing, see `Decision`; None: not known.
-        cut_short: (n,) boats whose search was ended by `ShieldConfig.work_budget`; None: not known, taken for none.
-        adversary_horizon_s: (n,) how long each boat, an opponent, may do its worst, s, NaN for those that are none;
-            None: not known.
-        solver: (n,) what found each least change, places in `SOLVERS`; None: not known.
-        barriers: names of the registered barriers that are kept.
-        area: (xmin, ymin, xmax, ymax) of the field decided in, m; None: there is none.
 
     Raises:
         FleetError: indexed by a name that no boat has, or by what is neither place nor name.
@@ -158,34 +147,22 @@ class Decisions(Sequence[Decision]):
 
     fleet: Fleet
     nominal: Commands
-    filtered: Commands
-    intervened: BoolArray
-    reason: IntArray
+    filtered: Commands  # in the same frame
+    intervened: BoolArray  # (n,), as all that follow
+    reason: IntArray  # values of `Reason`
     safety_margin_m: Array
     slack_m: Array
-    bound: IntArray
-    solve_time_s: float = field(compare=False)
-    no_table: BoolArray | None = None
-    cut_short: BoolArray | None = None
-    adversary_horizon_s: Array | None = None
-    solver: IntArray | None = None
-    barriers: tuple[str, ...] = ()
-    area: tuple[float, float, float, float] | None = None
+    bound: IntArray  # index of the binding neighbour, -1 none, -2 static constraints, -3 and below ``barriers``
+    solve_time_s: float = field(compare=False)  # of the whole decision
+    no_table: BoolArray | None = None  # (n, n) own boats and opponents without a value table; None: not known
+    cut_short: BoolArray | None = None  # None: not known, taken for none
+    adversary_horizon_s: Array | None = None  # NaN for boats that are no opponents; None: not known
+    solver: IntArray | None = None  # places in `SOLVERS`; None: not known
+    barriers: tuple[str, ...] = ()  # names of the registered barriers that are kept
+    area: tuple[float, float, float, float] | None = None  # xmin, ymin, xmax, ymax of the field, m; None: there is none
 
     def __len__(self) -> int:
         return len(self.reason)
-
-    @overload
-    def __getitem__(self, index: int | str) -> Decision: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[Decision]: ...
-    def __getitem__(self, index: int | str | slice) -> Decision | Sequence[Decision]:
-        if isinstance(index, slice):
-            return [self[i] for i in range(*index.indices(len(self)))]
-        i = self._place_of(index) if isinstance(index, str) else _place(index)
-        if not -len(self) <= i < len(self):
-            raise IndexError(f"no boat {i} in a fleet of {len(self)}")
-        return self._decision(i % len(self))
 
     def __iter__(self) -> Iterator[Decision]:
         return (self[i] for i in range(len(self)))
@@ -193,72 +170,67 @@ class Decisions(Sequence[Decision]):
     def __contains__(self, item: object) -> bool:
         return item in self.fleet.names if isinstance(item, str) else any(item == one for one in self)
 
-    def _place_of(self, name: str) -> int:
-        """The place of a boat in the fleet.
-
-        Raises:
-            FleetError: there is no boat of that name.
-        """
-        if name in self.fleet.names:
-            return self.fleet.names.index(name)
-        near = get_close_matches(name, self.fleet.names, 1)
-        hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(self.fleet.names) or 'none'}"
-        raise FleetError(f"no boat {name!r} in the fleet decided on; {hint}")
-
-    def _decision(self, i: int) -> Decision:
-        heading = self.fleet.heading_rad[i]
+    def __getitem__(self, index: int | str) -> Decision:
+        i = self._place(index)
+        if not -len(self) <= i < len(self):
+            raise IndexError(f"no boat {i} in a fleet of {len(self)}")
+        i, names = i % len(self), self.fleet.names
+        heading, bound, reason = self.fleet.heading_rad[i], int(self.bound[i]), Reason(int(self.reason[i]))
         wanted_speed, wanted_heading = self.nominal.absolute(i, heading)
         sent_speed, sent_heading = self.filtered.absolute(i, heading)
-        reason = Reason(int(self.reason[i]))
+        active = (names[bound],) if bound >= 0 else (FIELD,) if bound == STATIC else ()
         margin = float(self.safety_margin_m[i])
+        feared_s = math.nan if self.adversary_horizon_s is None else float(self.adversary_horizon_s[i])
+        covered = reason != Reason.NOT_COVERED
+        no_table = None if self.no_table is None else np.flatnonzero(self.no_table[i] & covered)
         return Decision(
-            boat=self.fleet.names[i],
+            boat=names[i],
             nominal_heading_rad=wanted_heading,
             nominal_speed_mps=wanted_speed,
             filtered_heading_rad=sent_heading,
             filtered_speed_mps=sent_speed,
             intervened=bool(self.intervened[i]),
             reason=reason,
-            active_constraints=self._active(int(self.bound[i])),
+            active_constraints=(self.barriers[STATIC - 1 - bound],) if bound < STATIC else active,
             safety_margin_m=margin if margin < 1e5 else math.inf,
             slack_m=float(self.slack_m[i]),
             fallback=FALLBACKS.get(reason),
             solve_time_s=self.solve_time_s,
-            no_table=self._no_table(i),
+            no_table=None if no_table is None else tuple(names[j] for j in no_table),
             cut_short=self.cut_short is not None and bool(self.cut_short[i]),
-            adversary_horizon_s=self._feared_s(i),
+            adversary_horizon_s=None if math.isnan(feared_s) else feared_s,
             outside_m=float(self.outside_m[i]),
             solver=None if self.solver is None else SOLVERS[int(self.solver[i])],
         )
 
-    def _active(self, bound: int) -> tuple[str, ...]:
-        if bound == STATIC:
-            return (FIELD,)
-        if bound < STATIC:
-            return (self.barriers[STATIC - 1 - bound],)
-        return (self.fleet.names[bound],) if bound >= 0 else ()
+    def _place(self, index: Any) -> int:
+        """The place of a boat in the fleet, by its name or place: no fraction, mask, True or False.
 
-    def _feared_s(self, i: int) -> float | None:
-        if self.adversary_horizon_s is None or math.isnan(self.adversary_horizon_s[i]):
-            return None
-        return float(self.adversary_horizon_s[i])
-
-    def _no_table(self, i: int) -> tuple[str, ...] | None:
-        if self.no_table is None:
-            return None
-        if self.reason[i] == Reason.NOT_COVERED:
-            return ()
-        return tuple(self.fleet.names[j] for j in np.flatnonzero(self.no_table[i]))
+        Raises:
+            FleetError: there is no such boat.
+        """
+        names = self.fleet.names
+        if isinstance(index, str):
+            if index in names:
+                return names.index(index)
+            near = get_close_matches(index, names, 1)
+            hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(names) or 'none'}"
+            raise FleetError(f"no boat {index!r} in the fleet decided on; {hint}")
+        if not isinstance(index, (bool, np.bool_)):
+            with suppress(TypeError):
+                return operator.index(index)
+        raise FleetError(
+            f"decisions are indexed by a boat's name or place in the fleet, not by {index!r}; of several boats at once "
+            "see their arrays: filtered.values, intervened, reason"
+        )
 
     def __str__(self) -> str:
         """One line a boat: the nominal command, the filtered one, and why."""
         heads = ("boat", "nominal deg", "m/s", "filtered deg", "m/s", "reason", "active constraint", "margin m")
-        rows = [heads, *(_cells(one) for one in self)]
+        rows = [heads, *(one._cells() for one in self)]
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        left = (0, 5, 6)  # words; numbers stand to the right
-        lines = [
-            "  ".join(f"{cell:{'<' if k in left else '>'}{widths[k]}}" for k, cell in enumerate(row)) for row in rows
-        ]
+        ways = "<>>>><<>"  # words stand to the left, numbers to the right
+        lines = ["  ".join(map("{:{}{}}".format, row, ways, widths)) for row in rows]
         return "\n".join(line.rstrip() for line in lines)
 
     @property
@@ -266,39 +238,11 @@ class Decisions(Sequence[Decision]):
         """(n,) how far outside the field's edge each boat was seen, m; 0 inside, or where there is no field."""
         if self.area is None:
             return np.zeros(len(self))
-        xmin, ymin, xmax, ymax = self.area
-        x, y = self.fleet.position_m.T
-        return np.maximum.reduce([xmin - x, ymin - y, x - xmax, y - ymax, np.zeros(len(self))])
+        low, high = np.reshape(self.area, (2, 2))
+        position_m = self.fleet.position_m
+        return np.maximum(low - position_m, position_m - high).max(axis=1, initial=0.0)
 
     @property
     def count_intervened(self) -> int:
         """Number of boats whose command was changed."""
         return int(np.count_nonzero(self.intervened))
-
-
-def _cells(one: Decision) -> tuple[str, ...]:
-    """A decision as cells of a table."""
-    wanted, sent = (
-        (f"{math.degrees(heading) % 360.0:.1f}", f"{speed:.2f}")
-        for heading, speed in (
-            (one.nominal_heading_rad, one.nominal_speed_mps),
-            (one.filtered_heading_rad, one.filtered_speed_mps),
-        )
-    )
-    margin = "-" if math.isinf(one.safety_margin_m) else f"{one.safety_margin_m:.2f}"
-    return (one.boat, *wanted, *sent, one.reason.name, ", ".join(one.active_constraints) or "-", margin)
-
-
-def _place(index: Any) -> int:
-    """A boat's place as Python's own whole number.
-
-    Raises:
-        FleetError: it is none: a fraction, a mask, True or False.
-    """
-    if not isinstance(index, (bool, np.bool_)):
-        with suppress(TypeError):
-            return operator.index(index)
-    raise FleetError(
-        f"decisions are indexed by a boat's name or place in the fleet, not by {index!r}; of several boats at once "
-        "see their arrays: filtered.values, intervened, reason"
-    )

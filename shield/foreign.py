@@ -6,7 +6,7 @@ import logging
 import unicodedata
 from collections.abc import Callable
 from functools import cache
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import entry_points
 from types import ModuleType
 from typing import Any
 
@@ -22,16 +22,13 @@ def load_others(group: str, register: Callable[[Any], Any] | None = None) -> Non
         register: takes what is no module; None: nothing is to be done with it.
     """
     for point in entry_points(group=group):
-        _load(point, group.rpartition(".")[2], register)
-
-
-def _load(point: EntryPoint, what: str, register: Callable[[Any], Any] | None) -> None:
-    try:
-        found = point.load()
-        if register is not None and not isinstance(found, ModuleType):
-            register(found)
-    except Exception as error:  # another package may raise anything
-        LOG.warning("%s of %s cannot be loaded: %s: %s", what, point.value, type(error).__name__, error)
+        try:
+            found = point.load()
+            if register is not None and not isinstance(found, ModuleType):
+                register(found)
+        except Exception as error:  # another package may raise anything
+            what = group.rpartition(".")[2]
+            LOG.warning("%s of %s cannot be loaded: %s: %s", what, point.value, type(error).__name__, error)
 
 
 _HIDDEN = ("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp")
@@ -51,7 +48,7 @@ def visible(text: object, keep: str = "") -> str:
     words = str(text)
     if words.isascii() and words.isprintable():
         return words
-    return "".join(letter if letter in keep or is_drawn(letter) else _code(letter) for letter in words)
+    return "".join(letter if letter in keep or is_drawn(letter) else _code(ord(letter)) for letter in words)
 
 
 def is_drawn(letter: str) -> bool:
@@ -59,8 +56,7 @@ def is_drawn(letter: str) -> bool:
     return unicodedata.category(letter) not in _HIDDEN
 
 
-def _code(letter: str) -> str:
-    number = ord(letter)
+def _code(number: int) -> str:
     return f"\\x{number:02x}" if number < 0x100 else f"\\u{number:04x}" if number < 0x10000 else f"\\U{number:08x}"
 
 

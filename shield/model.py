@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from .platforms.limits import ENOUGH_THRUST, FULL_THRUST, Limits, limits_of
 from .shared import share
 from .tables.files import ValueTable, load_table, stack_tables
 from .tables.grid import CAP
-from .tables.lookup import Tables, no_tables
+from .tables.lookup import Tables
 from .tables.settings import OtherMay
 from .workspace import Boats, Tuning
 
@@ -48,7 +48,13 @@ STATIC_REACTION_S = 0.5
 
 
 def tuning_of(config: ShieldConfig) -> Tuning:
-    """Scalar settings for compiled code."""
+    """Scalar settings for compiled code.
+
+    What teammates will do is known where one program decides for all, and sees and steers them as they are; not where
+    nothing is feared of opponents but that they hold their course: their margin is one with it.
+    """
+    exact = config.position_error_m == 0.0 and config.delay_s == 0.0 and config.current_mps == 0.0
+    known = config.coordination == "team" and exact and config.effective_adversary_horizon_s > 0.0
     return share(
         Tuning(
             dt_s=config.dt_s,
@@ -59,7 +65,7 @@ def tuning_of(config: ShieldConfig) -> Tuning:
             straight_horizon_s=config.straight_horizon_s,
             margin_cap_m=config.margin_cap_m,
             speed_weight=config.speed_weight,
-            teammate_margin_cap_m=config.teammate_margin_cap_m if _mates_are_known(config) else config.margin_cap_m,
+            teammate_margin_cap_m=config.teammate_margin_cap_m if known else config.margin_cap_m,
             static_decay=_decay(config.static_cbf_rate_per_s, config),
             deadlock_timeout_s=config.deadlock_timeout_s,
             adversary_horizon_s=config.effective_adversary_horizon_s,
@@ -72,15 +78,6 @@ def tuning_of(config: ShieldConfig) -> Tuning:
     )
 
 
-def _mates_are_known(config: ShieldConfig) -> bool:
-    """Whether what teammates will do is known: one program decides for all, and sees and steers them as they are.
-
-    Nor may it be where nothing is feared of opponents but that they hold their course: their margin is one with it.
-    """
-    exact = config.position_error_m == 0.0 and config.delay_s == 0.0 and config.current_mps == 0.0
-    return config.coordination == "team" and exact and config.effective_adversary_horizon_s > 0.0
-
-
 @lru_cache(maxsize=256)
 def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: tuple[int, ...]) -> Boats:
     """Constants of the boats of a fleet.
@@ -88,44 +85,46 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
     Raises:
         PlatformError: a platform is unknown.
     """
-    kinds = tuple(get_platform(name) for name in platforms)
-    limits = [limits_of(kind, config.model_s) for kind in kinds]
+    kinds, dt_s = tuple(get_platform(name) for name in platforms), config.model_s
+    limits = [limits_of(kind, dt_s) for kind in kinds]
     certificate = CERTIFICATES[config.opponent_model]
-    granted = 1.0 if config.effective_adversary_horizon_s > 0.0 else 0.0
-    strides = [_stride(kind, limit, config.model_s) for kind, limit in zip(kinds, limits, strict=True)]
-    stride = max(1, min(strides, default=1))
-    lookup = _tables_of(config, kinds, team) if granted == 1.0 else _no_tables(len(kinds))
-    with_table = np.asarray((lookup.table >= 0).any(axis=1))
+    pursuers = config.effective_adversary_horizon_s > 0.0
+    granted = 1.0 if pursuers else 0.0
+    stride = max(1, min((_stride(kind, limit, dt_s) for kind, limit in zip(kinds, limits, strict=True)), default=1))
+    tables, table, steps = _tables_of(config, kinds, team)
+    with_table = np.asarray((table >= 0).any(axis=1))
     params = np.array([kind.pack() for kind in kinds]).reshape(-1, L.N_PARAM)
-    if config.moves > 1:
-        params = np.column_stack([params, np.full(len(kinds), config.model_s)])
+    steady = np.minimum(params[:, L.MAX_THRUST], [limit.thrust for limit in limits])
+    plans, n_plans = _plans(certificate, kinds, with_table)
+    table_decay, decay = _decay(config.table_cbf_rate_per_s, config), _decay(config.cbf_rate_per_s, config)
+    table_cap_m = _table_cap_m(config, tables)
+    extra = [np.full(len(kinds), dt_s)] if config.moves > 1 else []
     return share(
         Boats(
-            params=params,
+            params=np.column_stack([params, *extra]),
             team=np.array(team, dtype=np.int64),
-            fastest_mps=np.array([kind.fastest_mps(config.model_s) for kind in kinds]),
+            fastest_mps=np.array([kind.fastest_mps(dt_s) for kind in kinds]),
             granted_turn_dps=np.array([granted * limit.turn_rate_dps for limit in limits]),
-            granted_acc_mps2=np.array([limit.acceleration_mps2 if granted > 0.0 else 0.0 for limit in limits]),
+            granted_acc_mps2=np.array([limit.acceleration_mps2 if pursuers else 0.0 for limit in limits]),
             regain_s=np.array([limit.regain_s for limit in limits]),
             granted_dec_mps2=np.array([limit.turn_deceleration_mps2 for limit in limits]),
             granted_loss=np.array([granted * _lasting_loss(limit) for limit in limits]),
-            ready_thrust=_ready_thrust(params, limits, with_table),
+            ready_thrust=np.where(with_table, FULL_THRUST * params[:, L.MAX_THRUST], ENOUGH_THRUST * steady),
             stride=stride,
-            sample_s=stride * config.model_s,
-            **_plans(certificate, kinds, with_table),
-            decay=np.where(
-                with_table, _decay(config.table_cbf_rate_per_s, config), _decay(config.cbf_rate_per_s, config)
-            ),
-            cap_m=np.where(with_table, _table_cap(config, lookup), config.margin_cap_m),
+            sample_s=stride * dt_s,
+            plans=plans,
+            n_plans=n_plans,
+            decay=np.where(with_table, table_decay, decay),
+            cap_m=np.where(with_table, table_cap_m, config.margin_cap_m),
             min_backup_hold_s=np.array([config.min_backup_hold_s if kind.kind == "rate" else 0.0 for kind in kinds]),
-            tables=lookup.tables,
-            table=lookup.table,
+            tables=tables,
+            table=table,
             table_margin_m=config.table_margin_m,
-            table_steps=np.where(with_table, lookup.steps, 0),
-            joint_decay=_decay(config.cbf_rate_per_s, config),
-            joint_samples=math.ceil(max(lookup.steps, round(JOINT_RUN_S / config.model_s)) / stride),
-            feared=np.asarray((lookup.table >= 0).any(axis=0)),
-            **_horizons(config, kinds, limits, team, stride * config.model_s, granted > 0.0),
+            table_steps=np.where(with_table, steps, 0),
+            joint_decay=decay,
+            joint_samples=math.ceil(max(steps, round(JOINT_RUN_S / dt_s)) / stride),
+            feared=np.asarray((table >= 0).any(axis=0)),
+            **_horizons(config, kinds, limits, team, stride * dt_s),
         )
     )
 
@@ -133,37 +132,28 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
 @lru_cache(maxsize=256)
 def missing_tables(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: tuple[int, ...]) -> BoolArray:
     """Pairs (own boat, opponent), (n, n), that a value table should answer for and none does; the log says why."""
-    sides = np.array(team)
-    wanted = config.effective_adversary_horizon_s > 0.0
-    limits = [limits_of(get_platform(name), config.model_s) for name in platforms]
-    kinds = [get_platform(name) for name in platforms]
-    uses = np.array(
-        [wanted and _uses_table(config, kind, limit) for kind, limit in zip(kinds, limits, strict=True)], dtype=np.bool_
-    )
+    sides, kinds = np.array(team), [get_platform(name) for name in platforms]
+    uses = np.array([_uses_table(config, kind) for kind in kinds], dtype=np.bool_)
     found: BoolArray = boats_of(config, platforms, team).table >= 0
     missing: BoolArray = uses[:, None] & (sides[:, None] != sides[None]) & ~found
-    missing.setflags(write=False)  # all shields of such a fleet tell the same one
     return missing
 
 
 def _horizons(
-    config: ShieldConfig,
-    kinds: tuple[Platform, ...],
-    limits: list[Limits],
-    team: tuple[int, ...],
-    sample_s: float,
-    pursuers: bool,
+    config: ShieldConfig, kinds: tuple[Platform, ...], limits: list[Limits], team: tuple[int, ...], sample_s: float
 ) -> dict[str, Any]:
     """How many samples each boat's paths, pursuers and static constraints are followed for."""
-    certificate = CERTIFICATES[config.opponent_model]
+    certificate, pursuers = CERTIFICATES[config.opponent_model], config.effective_adversary_horizon_s > 0.0
     horizon_s = [config.horizon_s or certificate.horizon_s(kind, config.model_s) for kind in kinds]
-    pursuit_s, static_s, thrust_s = list(horizon_s), [], []
-    for i, limit in enumerate(limits):
-        static_s.append(min(limit.half_turn_s + STATIC_REACTION_S, horizon_s[i]))
-        thrust_s.append(limit.thrust_s if pursuers else 0.0)
-        if pursuers:
-            pursuit_s[i] = max(horizon_s[i], certificate.pursuit_s(limit))
-    chase = _chases(kinds, team, pursuit_s, pursuers, sample_s)
+    pursuit_s, thrust_s, chase_s = list(horizon_s), [0.0] * len(kinds), [0.0] * len(kinds)
+    if pursuers:
+        pursuit_s = [max(own, certificate.pursuit_s(limit)) for own, limit in zip(horizon_s, limits, strict=True)]
+        thrust_s = [limit.thrust_s for limit in limits]
+        chase_s = [max(0.0, CHASE_S - value) for value in pursuit_s]
+    static_s = [min(limit.half_turn_s + STATIC_REACTION_S, own) for own, limit in zip(horizon_s, limits, strict=True)]
+    top, side = np.array([kind.pack()[L.MAX_SPEED] for kind in kinds]), np.array(team)
+    no_faster = (side[:, None] != side[None]) & (top[None] <= top[:, None])
+    chase = np.where(no_faster, _samples(chase_s, sample_s, 0)[:, None], 0)
     return {
         "chase_samples": chase,
         "chased_samples": chase.max(axis=1, initial=0),
@@ -175,49 +165,23 @@ def _horizons(
     }
 
 
-def _chases(
-    kinds: tuple[Platform, ...], team: tuple[int, ...], pursuit_s: list[float], pursuers: bool, sample_s: float
-) -> IntArray:
-    """Samples beyond its own pursuit for which each boat (row) is followed by opponents that are no faster, (n, n)."""
-    top, side = np.array([kind.pack()[L.MAX_SPEED] for kind in kinds]), np.array(team)
-    longer = _samples([max(0.0, CHASE_S - value) if pursuers else 0.0 for value in pursuit_s], sample_s, 0)
-    follows = (side[:, None] != side[None]) & (top[None] <= top[:, None])
-    return np.where(follows, longer[:, None], 0)
-
-
-def _ready_thrust(params: Array, limits: list[Limits], with_table: BoolArray) -> Array:
-    """Thrust, percent, from which boats have enough: of that at top speed, or for a table of all there is."""
-    top = params[:, L.MAX_THRUST]
-    steady = np.minimum(top, [limit.thrust for limit in limits])
-    return np.asarray(np.where(with_table, FULL_THRUST * top, ENOUGH_THRUST * steady))
-
-
 def _samples(times_s: list[float], sample_s: float, least: int) -> IntArray:
     return np.array([max(least, math.ceil(value / sample_s)) for value in times_s], dtype=np.int64)
 
 
-class _Lookup(NamedTuple):
-    """Value tables of a fleet: all of them, which holds for each pair (-1: none), and the steps of one table step."""
+def _tables_of(
+    config: ShieldConfig, kinds: tuple[Platform, ...], team: tuple[int, ...]
+) -> tuple[Tables, IntArray, int]:
+    """Value tables, which holds for each pair of own boat and opponent, and model steps of one table step.
 
-    tables: Tables
-    table: IntArray
-    steps: int
-
-
-def _no_tables(boats: int) -> _Lookup:
-    return _Lookup(no_tables(), np.full((boats, boats), -1, dtype=np.int64), 1)
-
-
-def _tables_of(config: ShieldConfig, kinds: tuple[Platform, ...], team: tuple[int, ...]) -> _Lookup:
-    """Tables of all pairs of opponents whose own boat looks them up; pairs without one are run through instead."""
-    lookup = _no_tables(len(kinds))
+    Pairs without one (-1) are run through instead, as are all where the own boat looks none up.
+    """
+    which = np.full((len(kinds), len(kinds)), -1, dtype=np.int64)
     found: dict[tuple[Platform, Platform], int] = {}
     tables: list[ValueTable] = []
     for i, own in enumerate(kinds):
-        if not _uses_table(config, own, limits_of(own, config.model_s)):
-            continue
         for j, other in enumerate(kinds):
-            if team[i] == team[j]:
+            if team[i] == team[j] or not _uses_table(config, own):
                 continue
             if (own, other) not in found:
                 table = _table_or_none(own, other)
@@ -225,14 +189,16 @@ def _tables_of(config: ShieldConfig, kinds: tuple[Platform, ...], team: tuple[in
                     continue
                 found[own, other] = len(tables)
                 tables.append(table)
-            lookup.table[i, j] = found[own, other]
+            which[i, j] = found[own, other]
     steps = max((round(table.card.dt_s / config.model_s) for table in tables), default=1)
-    return _Lookup(stack_tables(tables), lookup.table, max(config.moves, steps))
+    return stack_tables(tables), which, max(config.moves, steps)
 
 
-def _uses_table(config: ShieldConfig, kind: Platform, limit: Limits) -> bool:
+def _uses_table(config: ShieldConfig, kind: Platform) -> bool:
     """Whether a boat looks opponents up where there is a table; there is none for boats that turn by a rate loop."""
-    return kind.kind != "rate" and CERTIFICATES[config.opponent_model].uses_table(limit)
+    if config.effective_adversary_horizon_s <= 0.0 or kind.kind == "rate":
+        return False
+    return CERTIFICATES[config.opponent_model].uses_table(limits_of(kind, config.model_s))
 
 
 @lru_cache(maxsize=64)
@@ -245,13 +211,13 @@ def _table_or_none(own: Platform, other: Platform) -> ValueTable | None:
         return None
 
 
-def _plans(certificate: Certificate, kinds: tuple[Platform, ...], with_table: BoolArray) -> dict[str, Any]:
+def _plans(certificate: Certificate, kinds: tuple[Platform, ...], with_table: BoolArray) -> tuple[Array, IntArray]:
     """`Boats.plans` and `Boats.n_plans`."""
     families = [certificate.manoeuvres(*boat) for boat in zip(kinds, with_table, strict=True)]
     plans = np.full((len(kinds), max((len(family) for family in families), default=0), 3), np.nan)
     for rows, family in zip(plans, families, strict=True):
         rows[: len(family)] = family
-    return {"plans": plans, "n_plans": np.array([len(family) for family in families], dtype=np.int64)}
+    return plans, np.array([len(family) for family in families], dtype=np.int64)
 
 
 def _decay(cbf_rate_per_s: float, config: ShieldConfig) -> float:
@@ -259,15 +225,10 @@ def _decay(cbf_rate_per_s: float, config: ShieldConfig) -> float:
     return 0.0 if math.isinf(cbf_rate_per_s) else math.exp(-cbf_rate_per_s * config.dt_s)
 
 
-def _widest_m(config: ShieldConfig) -> float:
-    """Distance kept between boats whose tracks are as good as the settings say, m."""
-    return config.separation_m + config.buffer_m + 2.0 * config.position_error_m
-
-
-def _table_cap(config: ShieldConfig, lookup: _Lookup) -> float:
-    """Margins above this may shrink freely, m: no more than the tables can tell."""
-    kept_m = _widest_m(config) + config.table_margin_m
-    known_m = min((float(axes[CAP]) for axes in lookup.tables.axes), default=math.inf)
+def _table_cap_m(config: ShieldConfig, tables: Tables) -> float:
+    """Margins above this may shrink freely, m: no more than the tables can tell beyond the distance that is kept."""
+    kept_m = config.separation_m + config.buffer_m + 2.0 * config.position_error_m + config.table_margin_m
+    known_m = min((float(axes[CAP]) for axes in tables.axes), default=math.inf)
     return max(0.0, min(config.margin_cap_m, known_m - kept_m))
 
 

@@ -28,6 +28,7 @@ SETTING_PROPERTIES = {
     "visitor_feared_s": "effective_intruder_horizon_s",
 }
 PROFILES = {"players": "competitive", "rammers": "ramming", "hold-course": "constant_velocity"}
+FLEET = {"adversary_s": "adversary_horizon_s"}
 DECISION = {
     "wanted_heading_rad": "nominal_heading_rad",
     "wanted_speed_mps": "nominal_speed_mps",
@@ -37,16 +38,13 @@ DECISION = {
     "certificate_m": "safety_margin_m",
     "feared_s": "adversary_horizon_s",
 }
-"""Fields of `Decision`."""
 DECISIONS = {
     "wanted": "nominal",
     "sent": "filtered",
     "certificate_m": "safety_margin_m",
     "feared_s": "adversary_horizon_s",
 }
-"""Fields of `Decisions`."""
-FLEET = {"adversary_s": "adversary_horizon_s"}
-"""Fields of `Fleet`."""
+"""Fields of `Fleet`, `Decision` and `Decisions`."""
 
 T = TypeVar("T", bound=type)
 LOG = logging.getLogger(__name__)
@@ -62,11 +60,10 @@ def current_settings(settings: Mapping[str, Any], warned: bool = False) -> dict[
     renamed = {}
     for name, value in settings.items():
         new = SETTINGS.get(name, name)
-        known = PROFILES.get(value, value) if new == "profile" and isinstance(value, str) else value
-        for old, now in ((name, new), (value, known)):
+        renamed[new] = PROFILES.get(value, value) if new == "profile" and isinstance(value, str) else value
+        for old, now in ((name, new), (value, renamed[new])):
             if warned and now is not old and now != old:
                 LOG.warning("%s is now %s; the old name goes with the next release", old, now)
-        renamed[new] = known
     return renamed
 
 
@@ -85,27 +82,26 @@ def accepts_old_names(keywords: Mapping[str, str], attributes: Mapping[str, str]
     """
     readable = {**keywords, **(attributes or {})}
 
-    def decorate(cls: T) -> T:
-        def renaming(build: Callable[..., Any]) -> Callable[..., Any]:
-            @functools.wraps(build)
-            def called(*args: Any, **given: Any) -> Any:
-                for old in [name for name in given if name in keywords]:
-                    warn(old, keywords[old])
-                    given[keywords[old]] = given.pop(old)
-                return build(*args, **given)
+    def renaming(build: Callable[..., Any]) -> Callable[..., Any]:
+        @functools.wraps(build)
+        def called(*args: Any, **given: Any) -> Any:
+            for old in [name for name in given if name in keywords]:
+                warn(old, keywords[old])
+                given[keywords[old]] = given.pop(old)
+            return build(*args, **given)
 
-            return called
+        return called
 
-        def __getattr__(self: Any, name: str) -> Any:
-            if name not in readable:
-                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-            warn(name, readable[name])
-            return getattr(self, readable[name])
+    def read(self: Any, name: str) -> Any:
+        if name not in readable:
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        warn(name, readable[name])
+        return getattr(self, readable[name])
 
-        cls.__init__ = renaming(cls.__init__)  # type: ignore[misc]
+    def decorate(cls: Any) -> Any:
+        cls.__init__, cls.__getattr__ = renaming(cls.__init__), read
         if "of" in vars(cls):
-            cls.of = classmethod(renaming(vars(cls)["of"].__func__))  # type: ignore[attr-defined]
-        cls.__getattr__ = __getattr__  # type: ignore[attr-defined]
+            cls.of = classmethod(renaming(vars(cls)["of"].__func__))
         return cls
 
     return decorate

@@ -15,7 +15,7 @@ from . import workspace as W
 from .autopilots import Autopilots, all_known, to_turn, unknown_memory
 from .backup.paths import SAG_M
 from .barriers.registered import KeptBarriers
-from .commands import Commands, tell_of_limits, within_limits
+from .commands import Commands
 from .config import ShieldConfig
 from .decide import Deciders
 from .decision import Decisions
@@ -27,10 +27,11 @@ from .masks import passing
 from .model import boats_of, missing_tables
 from .platforms import layout as L
 from .surroundings import OPEN_WATER, Surroundings, off_m
-from .tracks import carry_over, check_ages, steps_of_delay, who_stayed
-from .workspace import Boats, Static
+from .tracks import carry_over, steps_of_delay, who_stayed
+from .workspace import Scene, Static
 
-_NUMBER = re.compile(r"([0-9]+)")
+NOMINAL = slice(W.NOMINAL_SPEED, W.NOMINAL_TURN + 1)
+"""Columns of nominal commands in what is given."""
 
 
 class Shield:
@@ -43,11 +44,10 @@ class Shield:
         minimise |u - u_wanted|^2   subject to   h(x+) >= exp(-alpha dt) h(x)   for every pair, edge and obstacle,
 
     with u the turn and speed of this step, chosen through the autopilot; against opponents the backup, and along edges
-    as little of it as will do. What it remembers between calls is the backup
-    of each boat, its margins and the commands on their way, for as long as the boat (name, platform, team) is in the
-    fleet; the same sequence of inputs from `reset` on gives the same bits.
-    It takes one call per step of the settings, and boats that do what was sent. It decides for one thread at a time:
-    compiled code works on its arrays without the GIL.
+    as little of it as will do. What it remembers between calls is the backup of each boat, its margins and the commands
+    on their way, for as long as the boat (name, platform, team) is in the fleet; the same sequence of inputs from
+    `reset` on gives the same bits. It takes one call per step of the settings, and boats that do what was sent. It
+    decides for one thread at a time: compiled code works on its arrays without the GIL.
 
     Args:
         config: settings; None takes the defaults.
@@ -70,18 +70,16 @@ class Shield:
             raise ConfigError(
                 f"config is a {type(config).__name__}; give a ShieldConfig, or settings: Shield(**settings)"
             )
-        self.config = config if config is not None else ShieldConfig.of(**settings)
+        self.config = ShieldConfig.of(**settings) if config is None else config
         self.surroundings = surroundings
         self._barriers = barriers_of(self.config)
-        self._packed: dict[Surroundings, Static] = {}
-        self._last_around: tuple[Surroundings, Static] | None = None
+        self._packed: tuple[Surroundings, Static] | None = None
         self._static(surroundings)  # one that does not fit the settings is refused here, not in a loop
         self._kept_from: Static | None = None
         self._deciders: Deciders | None = None
-        self._boats: Boats | None = None
+        self._known: tuple[Any, ...] | None = None
         self._missing: BoolArray | None = None
         self._autopilots: Autopilots | None = None
-        self._known: tuple[Any, ...] | None = None
         self.serves: object | None = None
 
     @classmethod
@@ -99,6 +97,21 @@ class Shield:
         from .wrappers.checks import settings_of
 
         return cls(**{**settings_of(game), **settings})
+
+    def wrap(self, policy: Any, read: Callable[[Any], Fleet] | None = None) -> Any:
+        """Put this shield around a policy.
+
+        Args:
+            policy: a team policy (``reset`` and ``act``, as `steerclear.policies.make` builds them), or any function of
+                what is seen to `Commands`.
+            read: for a function: turns what it sees into a `Fleet`.
+
+        Raises:
+            ConfigError: the policy is neither, or ``read`` is missing.
+        """
+        from .wrappers.policy import wrap_policy
+
+        return wrap_policy(policy, self, read)
 
     def reset(self) -> None:
         """Forget all backups, as before a new game."""
@@ -122,7 +135,7 @@ class Shield:
             twin.decide(*_tight_spot())
         if fleet is not None:
             fleet.check()
-            twin._deciders_of(fleet, order_of(fleet.names))
+            twin._deciders_of(fleet, twin._static(OPEN_WATER))
 
     def decide(self, fleet: Fleet, wanted: Commands, surroundings: Surroundings | None = None) -> Decisions:
         """Decide for all controlled boats of a fleet.
@@ -145,28 +158,28 @@ class Shield:
             ConfigError: the surroundings are of another kind or leave nothing of the field.
         """
         started = time.perf_counter()
-        _check(fleet, wanted)
-        order = order_of(fleet.names)
-        place = np.argsort(order)
-        boats, deciders = self._deciders_of(fleet, order)
-        check_ages(fleet, self.config)
-        highest = boats.params[place, L.MAX_SPEED]
-        within, cut = within_limits(wanted, fleet.names, fleet.controlled, highest)
+        around = self.surroundings if surroundings is None else surroundings
+        _check(fleet, wanted, self.config)
+        static = self._static(around)
+        deciders = self._deciders_of(fleet, static)
+        order, place = order_of(fleet.names)
+        params, pending = deciders.scene.boats.params, deciders.scene.pending
+        within, cut = wanted.within(fleet.names, fleet.controlled, params[place, L.MAX_SPEED])
         state, unknown = self._with_memory(fleet, order)
-        works = deciders.scene.pending[0, 0].copy() if deciders.scene.pending.size > 0 else None
-        self._give(fleet, state[place], within, order, deciders.scene.given)
+        works = pending[0, 0].copy() if pending.size > 0 else None
+        self._give(deciders.scene.given, fleet, state[place], within, order)
         self._barriers.renew()
-        deciders.decide(self._around(self.surroundings if surroundings is None else surroundings, deciders))
+        deciders.decide(self._keep_from(static, deciders.scene))
         self._barriers.tell()
-        sent, changed, reason, told = self._decided(deciders)
-        sent, changed, reason, told = sent[place], changed[place], reason[place], told[place]
+        sent, changed, reason, told = (values[place] for values in self._decided(deciders.scene))
         commands = within.replaced(changed, sent, fleet.state[:, L.HEADING]) if changed.any() else within
         if cut is not None:
-            changed = tell_of_limits(cut, changed, reason)
+            reason[cut & (reason == W.PASSED)] = W.LIMITED
+            changed |= cut
         if self._autopilots is not None and unknown is not None:
             sent_now = commands.as_relative_deg(fleet.state[:, L.HEADING])[order]
             works = sent_now if works is None else to_turn(works, state)
-            self._autopilots.go_on(unknown, boats.params, works, self.config.dt_s)
+            self._autopilots.go_on(unknown, params, works, self.config.dt_s)
         active = told[:, W.ACTIVE].astype(np.int64)
         return Decisions(
             fleet=fleet,
@@ -183,15 +196,13 @@ class Shield:
             adversary_horizon_s=told[:, W.FEARED_S],
             solver=told[:, W.SOLVER].astype(np.int64),
             barriers=self.config.barriers,
-            area=(self.surroundings if surroundings is None else surroundings).field,
+            area=around.field,
         )
 
     @property
-    def remembered(self) -> dict[str, np.ndarray]:
+    def remembered(self) -> dict[str, Array]:
         """What goes on from decision to decision, by name: live arrays; empty before the first one."""
-        if self._deciders is None:
-            return {}
-        return {"memory": self._deciders.scene.memories, "pending": self._deciders.scene.pending}
+        return {} if self._deciders is None else self._deciders.remembered
 
     def safe_actions(
         self, fleet: Fleet, actions: Sequence[Commands], surroundings: Surroundings | None = None
@@ -213,70 +224,53 @@ class Shield:
         if isinstance(actions, Commands) or not len(actions):
             raise FleetError("actions are one Commands or none; give a list of them, one for each candidate")
         for candidate in actions:
-            _check(fleet, candidate)
+            _check(fleet, candidate, self.config)
         around = self.surroundings if surroundings is None else surroundings
         same = self._known is not None and self._known[0] == _boats_in(fleet)
         asked = self if same and self._static(around) is self._kept_from else deepcopy(self)
-        return asked._passing(fleet, actions, around)
+        return asked._passing(fleet, actions, asked._static(around))
 
-    def _passing(self, fleet: Fleet, actions: Sequence[Commands], around: Surroundings) -> BoolArray:
-        order = order_of(fleet.names)
-        place = np.argsort(order)
-        boats, deciders = self._deciders_of(fleet, order)
-        check_ages(fleet, self.config)
+    def _passing(self, fleet: Fleet, actions: Sequence[Commands], static: Static) -> BoolArray:
+        deciders, (order, place) = self._deciders_of(fleet, static), order_of(fleet.names)
+        highest_mps = deciders.scene.boats.params[place, L.MAX_SPEED]
         candidates, whole = np.empty((len(fleet), len(actions), 2)), np.ones((len(fleet), len(actions)), np.bool_)
         for k, candidate in enumerate(actions):
-            within, cut = within_limits(candidate, fleet.names, fleet.controlled, boats.params[place, L.MAX_SPEED])
+            within, cut = candidate.within(fleet.names, fleet.controlled, highest_mps)
             candidates[:, k] = within.as_relative_deg(fleet.state[:, L.HEADING])
             whole[:, k] = True if cut is None else ~cut
         believed = deepcopy(self._autopilots)
         state, _ = self._with_memory(fleet, order)
         self._autopilots = believed  # what is asked here is not sent: nothing goes on from it
-        self._give(fleet, state[place], actions[0], order, deciders.scene.given)
+        self._give(deciders.scene.given, fleet, state[place], actions[0], order)
         self._barriers.renew()
         each = np.repeat(candidates[order][np.newaxis], len(deciders.scene.given), axis=0)
-        found = passing(deciders, self._around(around, deciders), each)
+        found = passing(deciders, self._keep_from(static, deciders.scene), each)
         self._barriers.tell()
-        own = np.arange(len(fleet))
-        passes: BoolArray = found[0] if self.config.coordination == "team" else found[own, own]
+        passes: BoolArray = found[self._own_rows(len(fleet))]
         return passes[place] & whole
 
-    def wrap(self, policy: Any, read: Callable[[Any], Fleet] | None = None) -> Any:
-        """Put this shield around a policy.
-
-        Args:
-            policy: a team policy (``reset`` and ``act``, as `steerclear.policies.make` builds them), or any function of
-                what is seen to `Commands`.
-            read: for a function: turns what it sees into a `Fleet`.
-
-        Raises:
-            ConfigError: the policy is neither, or ``read`` is missing.
-        """
-        from .wrappers.policy import wrap_policy
-
-        return wrap_policy(policy, self, read)
-
-    def _deciders_of(self, fleet: Fleet, order: IntArray) -> tuple[Boats, Deciders]:
-        """Boat constants and deciders of a fleet; what is remembered of boats that stay is theirs in a new fleet."""
+    def _deciders_of(self, fleet: Fleet, static: Static) -> Deciders:
+        """Deciders of a fleet; what is remembered of boats that stay is theirs in a new fleet."""
         known = _boats_in(fleet)
-        if self._boats is None or self._deciders is None or self._known is None or self._known[0] != known:
-            platforms, team = tuple(fleet.platforms[i] for i in order), tuple(int(fleet.team[i]) for i in order)
-            boats = boats_of(self.config, platforms, team)
-            keys = tuple(zip((fleet.names[i] for i in order), platforms, team, strict=True))
-            place = np.argsort(order)
-            self._missing = missing_tables(self.config, platforms, team)[np.ix_(place, place)]
-            self._missing.setflags(write=False)  # all decisions about these boats tell the same one
-            number = 1 if self.config.coordination == "team" else len(fleet)
-            new = Deciders(self.config, number, boats, self._static(self.surroundings), self._solver())
-            believed, self._autopilots = self._autopilots, None
-            if self._deciders is not None and self._known is not None:
-                stayed, then = who_stayed(self._known[1], keys)
-                carry_over(self._deciders.scene, new.scene, stayed, then, fleet.state[order])
-                if believed is not None and len(stayed) > 0:
-                    self._autopilots = Autopilots.of(len(fleet))
-                    self._autopilots.carry_over(believed, stayed, then)
-            self._boats, self._deciders, self._known = boats, new, (known, keys)
-        return self._boats, self._deciders
+        if self._deciders is not None and self._known is not None and self._known[0] == known:
+            return self._deciders
+        order, place = order_of(fleet.names)
+        platforms, team = tuple(fleet.platforms[i] for i in order), tuple(int(fleet.team[i]) for i in order)
+        keys = tuple(zip((fleet.names[i] for i in order), platforms, team, strict=True))
+        boats = boats_of(self.config, platforms, team)
+        self._missing = missing_tables(self.config, platforms, team)[np.ix_(place, place)]
+        self._missing.setflags(write=False)  # all decisions about these boats tell the same one
+        number = 1 if self.config.coordination == "team" else len(fleet)
+        new = Deciders(self.config, number, boats, static, self._solver())
+        believed, self._autopilots = self._autopilots, None
+        if self._deciders is not None and self._known is not None:
+            stayed, then = who_stayed(self._known[1], keys)
+            carry_over(self._deciders.scene, new.scene, stayed, then, fleet.state[order])
+            if believed is not None and len(stayed) > 0:
+                self._autopilots = Autopilots.of(len(fleet))
+                self._autopilots.carry_over(believed, stayed, then)
+        self._deciders, self._known = new, (known, keys)
+        return new
 
     def _solver(self) -> Solver | None:
         """What answers programs; None: the compiled solver. A method, so that programs can be looked at."""
@@ -284,12 +278,12 @@ class Shield:
 
     def _with_memory(self, fleet: Fleet, order: IntArray) -> tuple[Array, BoolArray | None]:
         """States in order with what is believed of autopilots, and (n,) own boats of which nobody tells it, if any."""
-        if self._autopilots is None and all_known(fleet.state):
-            return fleet.state[order], None
-        unknown: BoolArray = fleet.controlled & unknown_memory(fleet.state)
+        state = fleet.state[order]
+        if self._autopilots is None and all_known(state):
+            return state, None
+        unknown: BoolArray = fleet.controlled[order] & unknown_memory(state)
         if fleet.age_s is not None:  # what was sent since is not in what is seen
-            unknown &= fleet.age_s <= 0.5 * self.config.dt_s
-        state, unknown = fleet.state[order], unknown[order]
+            unknown &= fleet.age_s[order] <= 0.5 * self.config.dt_s
         if not unknown.any():
             self._autopilots = None
             return state, None
@@ -298,62 +292,63 @@ class Shield:
         self._autopilots.fill(state, unknown, self.config.dt_s, self.config.position_error_m)
         return state, unknown
 
-    def _give(self, fleet: Fleet, state: Array, within: Commands, order: IntArray, given: Array) -> None:
+    def _give(self, given: Array, fleet: Fleet, state: Array, within: Commands, order: IntArray) -> None:
         """Write what is to be decided about, for the team, or for each boat.
 
         A boat that decides for itself knows its own nominal command and takes teammates to hold their course.
         """
         rows = np.empty((len(fleet), W.N_GIVEN))
-        rows[:, : L.N_STATE], rows[:, W.OURS] = state, fleet.controlled
-        rows[:, W.NOMINAL_SPEED : W.NOMINAL_TURN + 1] = within.as_relative_deg(fleet.state[:, L.HEADING])
+        write_seen(rows, state, fleet.controlled, fleet.visiting, fleet.driven)
+        rows[:, NOMINAL] = within.as_relative_deg(fleet.state[:, L.HEADING])
         rows[:, W.AGE_S] = 0.0 if fleet.age_s is None else fleet.age_s
         rows[:, W.ERROR_M] = 0.0 if fleet.position_error_m is None else fleet.position_error_m
-        rows[:, W.VISITING] = 0.0 if fleet.visiting is None else fleet.visiting
         rows[:, W.HORIZON_S] = np.nan if fleet.adversary_horizon_s is None else fleet.adversary_horizon_s
-        rows[:, W.DRIVEN :] = np.nan if fleet.driven is None else fleet.driven
         given[:] = rows[order]
         if self.config.coordination == "per_boat":
-            own = np.arange(len(fleet))
-            nominal = given[own, own, W.NOMINAL_SPEED : W.NOMINAL_TURN + 1]
             given[~fleet.controlled[order], :, W.OURS] = 0.0  # these decide nothing
             given[:, :, W.NOMINAL_SPEED], given[:, :, W.NOMINAL_TURN] = given[:, :, L.SPEED], 0.0
-            given[own, own, W.NOMINAL_SPEED : W.NOMINAL_TURN + 1] = nominal
+            given[(*self._own_rows(len(fleet)), NOMINAL)] = rows[order, NOMINAL]
 
-    def _decided(self, deciders: Deciders) -> tuple[Array, BoolArray, IntArray, Array]:
+    def _own_rows(self, boats: int) -> tuple[Any, ...]:
+        """Where the decision that counts for each boat is: in the only one, or in its own."""
+        return (0,) if self.config.coordination == "team" else (np.arange(boats), np.arange(boats))
+
+    def _decided(self, scene: Scene) -> tuple[Array, BoolArray, IntArray, Array]:
         """What is sent (n, 2), whether it is changed, why, and what is told: of the team, or of each boat its own."""
-        scene = deciders.scene
-        if self.config.coordination == "team":
-            return scene.sent[0], scene.changed[0], scene.reasons[0], scene.told[0]
-        own = np.arange(len(scene.given))
-        if scene.pending.shape[1] > 0:  # what each boat was told all others see
-            scene.pending[:, -1] = scene.pending[own, -1, own]
-        told = scene.told[own, own]
-        for first in np.flatnonzero((scene.given[:, :, W.OURS] != 0.0).any(axis=1))[:1]:
-            told[:, W.FEARED_S] = scene.told[first, :, W.FEARED_S]
-        return scene.sent[own, own], scene.changed[own, own], scene.reasons[own, own], told
+        own = self._own_rows(len(scene.ours))
+        told = scene.told[own]
+        if self.config.coordination == "per_boat":
+            if scene.pending.shape[1] > 0:  # what each boat was told all others see
+                scene.pending[:, -1] = scene.pending[own[0], -1, own[1]]
+            for first in np.flatnonzero((scene.given[:, :, W.OURS] != 0.0).any(axis=1))[:1]:
+                told[:, W.FEARED_S] = scene.told[first, :, W.FEARED_S]
+        return scene.sent[own], scene.changed[own], scene.reasons[own], told
 
-    def _around(self, surroundings: Surroundings, deciders: Deciders) -> Static:
-        """Static constraints now; what was kept from others is no measure for these."""
-        static = self._static(surroundings)
+    def _keep_from(self, static: Static, scene: Scene) -> Static:
+        """Static constraints from now on; what was kept from others is no measure for these."""
         if static is not self._kept_from:
             self._kept_from = static
-            deciders.scene.memories[:, :, W.STATIC_MARGIN] = 0.0
+            scene.memories[:, :, W.STATIC_MARGIN] = 0.0
         return static
 
     def _static(self, surroundings: Surroundings) -> Static:
         if not isinstance(surroundings, Surroundings):
             raise ConfigError(f"surroundings are a {type(surroundings).__name__}; build them with Surroundings(...)")
-        if self._last_around is not None and surroundings is self._last_around[0]:
-            return self._last_around[1]
-        if surroundings not in self._packed:
-            if len(self._packed) > 64:
-                self._packed.clear()
-            self._packed[surroundings] = surroundings.pack(self.config, self._barriers.arrays)
-        self._last_around = surroundings, self._packed[surroundings]
-        return self._packed[surroundings]
+        if self._packed is None or (surroundings is not self._packed[0] and surroundings != self._packed[0]):
+            self._packed = surroundings, surroundings.pack(self.config, self._barriers.arrays)
+        return self._packed[1]
 
 
-def _check(fleet: Fleet, wanted: Commands) -> None:
+def write_seen(
+    given: Array, state: Array, ours: BoolArray, visiting: BoolArray | None = None, driven: Array | None = None
+) -> None:
+    """Write boats, (..., n) of them, into what is given to deciders; None: nothing is known."""
+    given[..., : L.N_STATE], given[..., W.OURS] = state, ours
+    given[..., W.VISITING] = 0.0 if visiting is None else visiting
+    given[..., W.DRIVEN :] = np.nan if driven is None else driven
+
+
+def _check(fleet: Fleet, wanted: Commands, config: ShieldConfig) -> None:
     """Check what is to be decided about.
 
     Raises:
@@ -367,6 +362,12 @@ def _check(fleet: Fleet, wanted: Commands) -> None:
     fleet.check()
     if wanted.values.shape != (len(fleet), 2):
         raise FleetError(f"commands of shape {wanted.values.shape} for {len(fleet)} boats; give one row per boat")
+    if fleet.age_s is not None and (fleet.age_s > config.max_track_age_s).any():
+        worst = int(np.argmax(fleet.age_s))
+        raise FleetError(
+            f"track of {fleet.names[worst]!r} is {fleet.age_s[worst]:.2f} s old, limit {config.max_track_age_s} s; "
+            "refresh it, raise max_track_age_s, or leave the boat out: then nobody keeps clear of it"
+        )
 
 
 def _boats_in(fleet: Fleet) -> tuple[Any, ...]:
@@ -376,20 +377,20 @@ def _boats_in(fleet: Fleet) -> tuple[Any, ...]:
 
 def barriers_of(config: ShieldConfig) -> KeptBarriers:
     """The registered barriers that a shield of such settings keeps."""
-    late_s = float(steps_of_delay(config) * config.dt_s)
-    return KeptBarriers(config.barriers, float(off_m(config)) + SAG_M, late_s)
+    return KeptBarriers(config.barriers, off_m(config) + SAG_M, steps_of_delay(config) * config.dt_s)
 
 
 @lru_cache(maxsize=256)
-def order_of(names: tuple[str, ...]) -> IntArray:
-    """Indices (n,) of boats by their names, numbers in them by their size."""
-    return np.array(sorted(range(len(names)), key=lambda i: (_parts(names[i]), i)), dtype=np.int64)
+def order_of(names: tuple[str, ...]) -> tuple[IntArray, IntArray]:
+    """Indices (n,) of boats by their names, numbers in them by their size; and each boat's place in that order."""
+    order = np.array(sorted(range(len(names)), key=lambda i: _parts(names[i])), dtype=np.int64)
+    return order, np.argsort(order)
 
 
-def _parts(name: str) -> list[tuple[bool, int, str, str]]:
-    """A name as what it is compared by: texts and the numbers between them, of any length."""
-    digits = [part.lstrip("0") if k % 2 else "" for k, part in enumerate(_NUMBER.split(name))]
-    return [(bool(k % 2), len(digits[k]), digits[k], part) for k, part in enumerate(_NUMBER.split(name))]
+def _parts(name: str) -> list[tuple[int, str, str]]:
+    """A name as what it is compared by: texts and, at every other place, numbers of any length."""
+    parts = enumerate(re.split("([0-9]+)", name))
+    return [(len(part.lstrip("0")), part.lstrip("0"), part) if k % 2 else (0, "", part) for k, part in parts]
 
 
 def _tight_spot() -> tuple[Fleet, Commands, Surroundings]:

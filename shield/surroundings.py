@@ -6,7 +6,6 @@ before what pursuing opponents may do. Edge and keep-out circles are rules, and 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -26,6 +25,11 @@ Point = tuple[float, float]
 
 LAST_SHARE = 0.5
 """Boats are stopped before an obstacle when within this share of the hull of it: until then they may turn away."""
+
+NOWHERE = np.array([-np.inf, -np.inf, np.inf, np.inf])
+"""The edge where there is none."""
+
+OUTWARDS = np.array([-1.0, -1.0, 1.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -53,21 +57,19 @@ class Surroundings:
 
     def __post_init__(self) -> None:
         if self.field is not None:
-            object.__setattr__(self, "field", _numbers("field", self.field, "(xmin, ymin, xmax, ymax)"))
+            object.__setattr__(self, "field", _row("field", self.field, "(xmin, ymin, xmax, ymax)"))
+            if not (self.field[0] < self.field[2] and self.field[1] < self.field[3]):
+                raise ConfigError(f"field {self.field} is empty; give (xmin, ymin, xmax, ymax)")
         for name in ("circles", "keep_out", "stops"):
-            rows = tuple(_numbers(name, row, "(x, y, radius)") for row in _rows(name, getattr(self, name)))
-            object.__setattr__(self, name, rows)
-        corners = tuple(
-            tuple(_numbers("polygons", corner, "(x, y)") for corner in _rows("polygons", line))
-            for line in _rows("polygons", self.polygons)
+            object.__setattr__(self, name, _rows(name, getattr(self, name), "(x, y, radius)"))
+            if any(radius < 0 for *_, radius in getattr(self, name)):
+                raise ConfigError(f"{name} holds a negative radius; give (x, y, radius) with radius >= 0")
+        polygons = tuple(
+            _rows("polygons", line, "(x, y)") for line in _each("polygons", self.polygons, "corners (x, y)")
         )
-        object.__setattr__(self, "polygons", corners)
-        if any(circle[2] < 0 for circle in (*self.circles, *self.keep_out, *self.stops)):
-            raise ConfigError("a circle has a negative radius; give (x, y, radius) with radius >= 0")
-        if any(len(polygon) < 3 for polygon in self.polygons):
+        object.__setattr__(self, "polygons", polygons)
+        if any(len(polygon) < 3 for polygon in polygons):
             raise ConfigError("a polygon has fewer than three corners; give [(x, y), (x, y), (x, y), ...] in m")
-        if self.field is not None and not (self.field[0] < self.field[2] and self.field[1] < self.field[3]):
-            raise ConfigError(f"field {self.field} is empty; give (xmin, ymin, xmax, ymax)")
 
     def pack(self, config: ShieldConfig, registered: Registered | None = None) -> Static:
         """Arrays for compiled code, widened by the distances of the settings and by how far off a boat may be seen.
@@ -78,38 +80,36 @@ class Surroundings:
             ConfigError: nothing of the field is left.
         """
         wider_m = off_m(config)
+        hull_m, stop = config.obstacle_clearance_m + wider_m, config.beyond_then == "stop"
         circles = [(x, y, r + config.obstacle_clearance_m + wider_m) for x, y, r in self.circles]
         circles += [(x, y, r + wider_m) for x, y, r in self.stops]
         segments = [(*polygon[k - 1], *polygon[k]) for polygon in self.polygons for k in range(len(polygon))]
+        line = NOWHERE
+        if self.field is not None and config.beyond_m is not None and stop:
+            line = np.array(self.field) + config.beyond_m * OUTWARDS
         return share(
             Static(
                 field=self._edge(config),
                 keep_out=np.array([(x, y, r + wider_m) for x, y, r in self.keep_out], dtype=np.float64).reshape(-1, 3),
                 circles=np.array(circles, dtype=np.float64).reshape(-1, 3),
                 segments=np.array(segments, dtype=np.float64).reshape(-1, 4),
-                segment_m=config.obstacle_clearance_m + wider_m,
+                segment_m=hull_m,
                 side_m=wider_m,
                 current_mps=float(config.current_mps),
-                line=self._line(config),
-                last_circles=len(self.circles) if config.beyond_then == "stop" else 0,
-                last_segments=len(segments) if config.beyond_then == "stop" else 0,
+                line=line.copy(),
+                last_circles=len(self.circles) if stop else 0,
+                last_segments=len(segments) if stop else 0,
                 last_m=LAST_SHARE * config.obstacle_clearance_m,
                 registered=new_registered() if registered is None else registered,
             )
         )
 
-    def _line(self, config: ShieldConfig) -> Array:
-        """The rectangle (xmin, ymin, xmax, ymax) beyond which boats are stopped, m; infinite where none are."""
-        if self.field is None or config.beyond_m is None or config.beyond_then != "stop":
-            return np.array([-np.inf, -np.inf, np.inf, np.inf])
-        return np.array(self.field, np.float64) + config.beyond_m * np.array([-1.0, -1.0, 1.0, 1.0])
-
     def _edge(self, config: ShieldConfig) -> Array:
         """The rectangle (xmin, ymin, xmax, ymax) kept, m; infinite where there is none."""
         if self.field is None or config.edge_m is None:
-            return np.array([-np.inf, -np.inf, np.inf, np.inf])
+            return NOWHERE.copy()
         inside_m = config.edge_m + off_m(config)
-        edge = np.array(self.field, np.float64) + inside_m * np.array([1.0, 1.0, -1.0, -1.0])
+        edge = np.array(self.field) - inside_m * OUTWARDS
         if not (edge[0] < edge[2] and edge[1] < edge[3]):
             raise ConfigError(
                 f"field {self.field} is too small to keep {inside_m:g} m inside its edge; give a larger field, "
@@ -123,43 +123,33 @@ def off_m(config: ShieldConfig) -> float:
     return config.position_error_m + config.current_mps * (config.delay_s + config.dt_s + 2.0 * LEAVE_S)
 
 
-def _rows(name: str, value: object) -> tuple[Any, ...]:
-    """The rows of a list of things.
-
-    Raises:
-        ConfigError: it is no list.
-    """
-    if isinstance(value, (str, bytes, Mapping)) or not isinstance(value, Iterable):
-        raise ConfigError(f"{name} holds {value!r}; give {_LISTS[name]}")
+def _each(name: str, value: object, form: str) -> tuple[Any, ...]:
+    """The entries of a list of things."""
     try:
+        if isinstance(value, (str, bytes, Mapping)) or not isinstance(value, Iterable):
+            raise TypeError("it is no list")
         return tuple(value)
-    except Exception as error:
-        raise ConfigError(f"{name} cannot be read ({error}); give {_LISTS[name]}") from None
+    except Exception as error:  # foreign objects may raise anything
+        raise ConfigError(f"{name} holds {value!r}, no list ({error}); give a list of {form} in m") from None
 
 
-_CIRCLES = "a list of circles (x, y, radius) in m"
-_LISTS = {
-    "circles": _CIRCLES,
-    "keep_out": _CIRCLES,
-    "stops": _CIRCLES,
-    "polygons": "a list of polygons, each a list of corners (x, y) in m",
-}
+def _rows(name: str, value: object, form: str) -> tuple[Any, ...]:
+    return tuple(_row(name, row, form) for row in _each(name, value, form))
 
 
-def _numbers(name: str, row: object, form: str) -> tuple[float, ...]:
+def _row(name: str, row: object, form: str) -> tuple[float, ...]:
     """A row as a tuple of finite floats of a sensible size, as many as ``form`` names."""
     try:
         array = numbers(row)
     except NoNumbersError:
-        raise ConfigError(f"{name} holds {row!r}; give {form} in m") from None
-    values = tuple(array.tolist()) if array.ndim == 1 else ()
-    if len(values) != form.count(",") + 1:
+        array = np.zeros((0, 0))
+    if array.shape != (form.count(",") + 1,):
         raise ConfigError(f"{name} holds {row!r}; give {form} in m")
-    if not all(math.isfinite(value) for value in values):
-        raise ConfigError(f"{name} holds a value that is not finite: {row}")
-    if any(abs(value) > LARGEST for value in values):
-        raise ConfigError(f"{name} holds a value beyond {LARGEST:g} m: {row}; give {form} in m from a place nearby")
-    return values
+    if not (np.abs(array) <= LARGEST).all():
+        raise ConfigError(
+            f"{name} holds a value that is not finite or beyond {LARGEST:g} m: {row}; give {form} from a place nearby"
+        )
+    return tuple(array.tolist())
 
 
 OPEN_WATER = Surroundings()

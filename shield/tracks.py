@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 
 from .config import ShieldConfig
-from .exceptions import FleetError
-from .fleet import Fleet
 from .jit import Array, BoolArray, IntArray, copy_row, kernel
 from .platforms import layout as L
 from .platforms.step import step_boat
@@ -105,29 +103,10 @@ def steps_of_delay(config: ShieldConfig) -> int:
     return whole_steps(config.delay_s, config.dt_s)
 
 
-def check_ages(fleet: Fleet, config: ShieldConfig) -> None:
-    """Check the ages of tracks.
-
-    Raises:
-        FleetError: one is not usable, or older than ``max_track_age_s``.
-    """
-    age = fleet.age_s
-    if age is None:
-        return
-    if not (np.isfinite(age).all() and (age >= 0).all()):
-        raise FleetError("age_s holds a value that is negative or not finite; give seconds since each track's fix")
-    worst = int(np.argmax(age)) if len(age) > 0 else -1
-    if worst >= 0 and age[worst] > config.max_track_age_s:
-        raise FleetError(
-            f"track of {fleet.names[worst]!r} is {age[worst]:.2f} s old, limit {config.max_track_age_s} s; "
-            "refresh it, raise max_track_age_s, or leave the boat out: then nobody keeps clear of it"
-        )
-
-
 def who_stayed(before: tuple[Any, ...], now: tuple[Any, ...]) -> tuple[IntArray, IntArray]:
     """Places now and then of boats of the same (name, platform, team); none where two boats have one name."""
     place = {key: k for k, key in enumerate(before)}
-    if len({key[0] for key in before}) < len(before) or len({key[0] for key in now}) < len(now):
+    if any(len({name for name, *_ in keys}) < len(keys) for keys in (before, now)):
         place = {}
     stayed = [i for i, key in enumerate(now) if key in place]
     return np.array(stayed, dtype=np.int64), np.array([place[now[i]] for i in stayed], dtype=np.int64)
@@ -148,7 +127,14 @@ def carry_over(old: Scene, new: Scene, stayed: IntArray, then: IntArray, state: 
     """
     if len(stayed) == 0:
         return
-    met = _meets_new(stayed, new, state)
+    fresh, boats = np.ones(len(state), np.bool_), new.boats
+    fresh[stayed] = False
+    pursued = boats.pursuit_samples + boats.thrust_samples + boats.chased_samples
+    horizon_s = (np.maximum(boats.samples, pursued).max() + 1) * boats.sample_s + new.tuning.straight_horizon_s
+    top: Array = np.maximum(boats.fastest_mps, np.abs(state[:, L.SPEED]))
+    gap_m = np.hypot(state[:, None, L.X] - state[None, :, L.X], state[:, None, L.Y] - state[None, :, L.Y])
+    meets: BoolArray = gap_m <= new.tuning.radius_m + (top[:, None] + top[None]) * horizon_s
+    met = (meets & fresh[None] & ~np.eye(len(state), dtype=np.bool_)).any(axis=1)
     new.pending[:, :, stayed] = old.pending[:1, :, then]  # all deciders know what all boats were told
     for_team = len(old.memories) == len(new.memories) == 1
     for i, k in [(0, 0)] if for_team else zip(stayed, then, strict=True):
@@ -159,16 +145,3 @@ def carry_over(old: Scene, new: Scene, stayed: IntArray, then: IntArray, state: 
         kept[stayed, BLOCKED_BY] = places[was[then, BLOCKED_BY].astype(np.int64)]
         kept[met, BACKUP_MARGIN] = np.minimum(kept[met, BACKUP_MARGIN], 0.0)
         kept[np.ix_(stayed, N_MEMORY + stayed)] = was[np.ix_(then, N_MEMORY + then)]
-
-
-def _meets_new(stayed: IntArray, scene: Scene, state: Array) -> BoolArray:
-    """Boats, (n,), that one which was not there before can come near to while paths are looked at."""
-    boats, tuning = scene.boats, scene.tuning
-    fresh = np.ones(len(state), np.bool_)
-    fresh[stayed] = False
-    pursued = boats.pursuit_samples + boats.thrust_samples + boats.chased_samples
-    horizon_s = (np.maximum(boats.samples, pursued).max() + 1) * boats.sample_s + tuning.straight_horizon_s
-    top: Array = np.maximum(boats.fastest_mps, np.abs(state[:, L.SPEED]))
-    gap_m = np.hypot(state[:, None, L.X] - state[None, :, L.X], state[:, None, L.Y] - state[None, :, L.Y])
-    reach_m = tuning.radius_m + (top[:, None] + top[None]) * horizon_s
-    return np.asarray(((gap_m <= reach_m) & fresh[None] & ~np.eye(len(state), dtype=np.bool_)).any(axis=1))

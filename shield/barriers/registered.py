@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from ..hints import say_once
+from ..arrays import say_once
 from ..jit import Array, lean_kernel
 from ..platforms import layout as L
 from ..workspace import Registered, Scene, new_registered

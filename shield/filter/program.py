@@ -39,17 +39,16 @@ OPTIONS: dict[str, dict[str, Any]] = {
 
 @dataclass(frozen=True)
 class Program:
-    """A program min 1/2 |z - z0|^2, C z >= d.
-
-    Attributes:
-        C: (rows, n) rows of unit length.
-        d: (rows,).
-        z0: (n,) the wanted inputs.
-    """
+    """A program min 1/2 |z - z0|^2, C z >= d: rows C of unit length, (rows, n), d (rows,), wanted inputs z0 (n,)."""
 
     C: Array
     d: Array
     z0: Array
+
+    def holds(self, z: Array, tolerance: float = ROW_TOLERANCE) -> bool:
+        """Whether every row of C z >= d - tolerance holds; written so that NaN fails."""
+        with np.errstate(all="ignore"):
+            return bool((self.C @ z >= self.d - tolerance).all())
 
 
 Solver = Callable[[Program], Array | None]
@@ -74,23 +73,6 @@ def check_solver(name: str) -> None:
         )
 
 
-def holds(C: Array, d: Array, z: Array, tolerance: float) -> bool:
-    """Whether every row of C z >= d - tolerance holds; written so that NaN fails."""
-    with np.errstate(all="ignore"):
-        return bool((C @ z >= d - tolerance).all())
-
-
-def _ask(program: Program, solver: str) -> Any:
-    """What the backend answers, whatever that is."""
-    dense = solver in qpsolvers.dense_solvers
-    with warnings.catch_warnings():  # some also warn of programs without an answer: that is read from the answer
-        warnings.simplefilter("ignore")
-        weight, rows = np.eye(len(program.z0)), -program.C
-        matrices = (weight, rows) if dense else (csc_matrix(weight), csc_matrix(rows))
-        options = OPTIONS.get(solver, {})
-        return qpsolvers.solve_qp(matrices[0], -program.z0, matrices[1], -program.d, solver=solver, **options)
-
-
 def solve(program: Program, solver: str) -> Array | None:
     """Answer of the program, shape (n,), or None when the backend finds none that passes our own check.
 
@@ -98,8 +80,12 @@ def solve(program: Program, solver: str) -> Array | None:
     """
     if not all(np.isfinite(numbers).all() for numbers in (program.C, program.d, program.z0)):
         return None  # some backends take half a minute over these
+    kind = np.asarray if solver in qpsolvers.dense_solvers else csc_matrix
+    weight, rows, options = kind(np.eye(len(program.z0))), kind(-program.C), OPTIONS.get(solver, {})
     try:
-        answer = _ask(program, solver)
+        with warnings.catch_warnings():  # some also warn of programs without an answer: that is read from the answer
+            warnings.simplefilter("ignore")
+            answer = qpsolvers.solve_qp(weight, -program.z0, rows, -program.d, solver=solver, **options)
     except (qpsolvers.exceptions.QPError, ValueError, ArithmeticError):
         return None
     except Exception as error:  # whatever goes wrong in foreign code, the ladder takes over
@@ -107,4 +93,4 @@ def solve(program: Program, solver: str) -> Array | None:
         return None
     if not isinstance(answer, np.ndarray) or answer.shape != program.z0.shape or answer.dtype != np.float64:
         return None
-    return answer if holds(program.C, program.d, answer, ROW_TOLERANCE) else None
+    return answer if program.holds(answer) else None

@@ -1,17 +1,23 @@
-"""Commands keep the frame they were given in, and say the same thing in the other."""
+"""Commands keep the frame they were given in, say the same thing in the other, and are within what a platform does."""
 
+import logging
 import math
+import re
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shield_scenes import bits
-from steerclear.shield import Commands
+from shield_scenes import bits, fleet_of
+from steerclear.shield import Commands, Fleet, Reason, Shield, ShieldConfig, arrays
+from steerclear.shield.batch import BatchedShield
 from steerclear.shield.exceptions import FleetError
 
 quick = settings(max_examples=100, deadline=None, derandomize=True)
 PAIRS = st.lists(st.tuples(st.floats(-20.0, 20.0), st.floats(-720.0, 720.0)), min_size=1, max_size=6)
+FRAMES = [Commands.relative_deg, Commands.game_deg, Commands.absolute_rad, Commands.absolute_deg]
+ALONE = [(0, 0, 10.0, 1.0), (500, 0, -170.0, 2.0)]
+TOP_MPS = {"heron": 2.0, "surveyor": 3.0, "si": 10.0}
 
 
 def apart_rad(a, b):
@@ -27,6 +33,7 @@ def test_absolute_and_relative_say_the_same(pairs, data):
     absolute = Commands.absolute_rad(
         [(speed, math.radians(heading[i] + turn)) for i, (speed, turn) in enumerate(pairs)]
     )
+    assert bits(relative.as_relative_deg(heading)) == bits(np.array(pairs)), "handed on untouched"
     back = absolute.as_relative_deg(heading)
     assert back[:, 0].tolist() == [speed for speed, _ in pairs]
     assert ((back[:, 1] >= -180.0) & (back[:, 1] <= 180.0)).all()
@@ -36,13 +43,6 @@ def test_absolute_and_relative_say_the_same(pairs, data):
         assert own[0] == other[0] == pairs[i][0]
         assert apart_rad(own[1], other[1]) < 1e-9
         assert 0.0 <= own[1] <= 2.0 * math.pi
-
-
-@quick
-@given(PAIRS)
-def test_relative_commands_are_handed_on_untouched(pairs):
-    commands = Commands.relative_deg(pairs)
-    assert bits(commands.as_relative_deg(np.full(len(pairs), 33.3))) == bits(np.array(pairs))
 
 
 @quick
@@ -63,68 +63,158 @@ def test_replacing_rows_keeps_the_others_bit_for_bit(pairs, data):
         assert all(abs(math.remainder(a - b, 360.0)) < 1e-9 for a, b in zip(told[:, 1], new[changed, 1], strict=True))
 
 
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, 1.1e6, -1.1e6, 1e15, 1.7e308])
 def test_headings_that_are_none_stay_none_without_a_warning(value):
     commands = Commands.absolute_rad([[1.0, value], [value, 1.0]])
     relative = commands.as_relative_deg(np.zeros(2))
-    assert not math.isfinite(relative[0, 1])
+    assert math.isnan(relative[0, 1])
     assert math.degrees(1.0) == pytest.approx(relative[1, 1])
-    assert not math.isfinite(commands.absolute(0, 0.0)[1])
+    assert math.isfinite(commands.absolute(0, 0.0)[1]) == math.isfinite(value)
 
 
-@pytest.mark.parametrize("heading", [1.1e6, -1.1e6, 1e15, 1e300, 1.7e308])
-def test_huge_headings_are_none(heading):
-    assert math.isnan(Commands.absolute_rad([[1.0, heading]]).as_relative_deg(np.zeros(1))[0, 1])
-
-
-@pytest.mark.parametrize("heading", [0.9e6, -0.9e6])
-def test_headings_of_many_turns_are_the_direction_that_is_told(heading):
-    commands = Commands.absolute_rad([[1.0, heading]])
-    relative = commands.as_relative_deg(np.zeros(1))[0, 1]
-    assert apart_rad(math.radians(relative), commands.absolute(0, 0.0)[1]) < 1e-8
-
-
-@pytest.mark.parametrize("make", [Commands.relative_deg, Commands.absolute_rad])
-@pytest.mark.parametrize("values", [[1.0, 2.0], [[1.0, 2.0, 3.0]], [[[1.0, 2.0]]], 3.0, [[1.0]], np.zeros((2, 2, 2))])
-def test_other_shapes_are_refused_with_the_one_wanted(make, values):
-    with pytest.raises(FleetError, match=r"commands have shape .*give \(n, 2\): speed m/s and heading"):
-        make(values)
-
-
-BOOLS = [
-    [[True, False]],
-    [[1.0, True]],
-    [(np.False_, 0.5)],
-    np.ones((2, 2), bool),
-    [np.array([True, False])],
-    np.array([[1.0, True]], object),
-]
-
-
-@pytest.mark.parametrize(
-    "make", [Commands.relative_deg, Commands.game_deg, Commands.absolute_rad, Commands.absolute_deg]
-)
-@pytest.mark.parametrize("values", BOOLS)
-def test_true_and_false_are_no_commands(make, values):
-    with pytest.raises(
-        FleetError, match=r"commands are not numbers \(some are True or False\); give an \(n, 2\) array"
-    ):
-        make(values)
-
-
-@pytest.mark.parametrize("values", [[["fast", 0.0]], [[1.0, 2.0], [3.0]], [[object(), 1.0]]])
-def test_what_is_no_number_is_refused(values):
-    with pytest.raises(FleetError, match=r"commands are not numbers .*\(n, 2\)"):
-        Commands.relative_deg(values)
-
-
-def test_a_missing_value_becomes_nan_and_is_held_later():
-    assert math.isnan(Commands.relative_deg([[None, 2.0]]).values[0, 0])
-
-
-def test_commands_are_a_copy_of_what_was_given():
+def test_commands_are_a_copy_of_what_was_given_and_degrees_are_kept_in_rad():
     given_values = np.ones((2, 2))
     commands = Commands.relative_deg(given_values)
     given_values[:] = 9.0
     assert (commands.values == 1.0).all()
-    assert len(commands) == 2
+    turns = Commands.absolute_deg([[1.5, 90.0], [1.0, -30.0], [0.5, 710.0]])
+    assert not turns.relative
+    np.testing.assert_allclose(turns.values[:, 1], [math.pi / 2, -math.pi / 6, math.radians(350.0)])
+    assert np.isnan(Commands.absolute_deg([[1.0, math.inf]]).values[0, 1])
+    assert math.isnan(Commands.relative_deg([[None, 2.0]]).values[0, 0])
+    many = Commands.absolute_rad([[1.0, 0.9e6]])  # the direction that is told, whatever the turns
+    assert apart_rad(math.radians(many.as_relative_deg(np.zeros(1))[0, 1]), many.absolute(0, 0.0)[1]) < 1e-8
+
+
+@pytest.mark.parametrize("make", FRAMES)
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        *(
+            (wrong, r"has shape .*expected \('n', 2\)")
+            for wrong in ([1.0, 2.0], [[1.0, 2.0, 3.0]], [[[1.0, 2.0]]], 3.0)
+        ),
+        *(
+            (wrong, "True or False")
+            for wrong in ([[True, False]], [[1.0, True]], [(np.False_, 0.5)], np.ones((2, 2), bool))
+        ),
+        *((wrong, "not an array of numbers") for wrong in ([["fast", 0.0]], [[1.0, 2.0], [3.0]], [[object(), 1.0]])),
+    ],
+)
+def test_what_is_no_speed_and_heading_is_refused(make, values, text):
+    with pytest.raises(FleetError, match=rf"array of commands \(speed m/s, heading\) .*{text}"):
+        make(values)
+
+
+def decide(rows, make, platform="heron", team=(0, 0)):
+    return Shield().decide(fleet_of(ALONE, team, platform), make(rows))
+
+
+@pytest.mark.parametrize("make", [Commands.absolute_rad, Commands.absolute_deg, Commands.relative_deg])
+@pytest.mark.parametrize("platform", TOP_MPS)
+@pytest.mark.parametrize("beyond", [1e-3, 88.0, 1e5])
+def test_no_more_than_top_speed_is_sent_and_no_boat_is_sent_astern(make, platform, beyond):
+    top = TOP_MPS[platform]
+    decisions = decide([[top + beyond, 0.5], [1.0, 0.25]], make, platform)
+    first, second = decisions
+    assert (first.filtered_speed_mps, first.reason, first.intervened) == (top, Reason.LIMITED, True)
+    assert first.nominal_speed_mps == top + beyond
+    assert first.filtered_heading_rad == first.nominal_heading_rad
+    assert first.active_constraints == ()
+    assert (second.reason, second.intervened) == (Reason.PASSED, False)
+    assert bits(decisions.filtered.values[1]) == bits(make([[1.0, 0.25]]).values[0])
+    astern = decide([[-beyond, 0.5], [1.0, 0.25]], make, platform)[0]
+    assert (astern.filtered_speed_mps, astern.reason, astern.intervened) == (0.0, Reason.LIMITED, True)
+
+
+@pytest.mark.parametrize(("heading", "sent"), [(181.0, -179.0), (-181.0, 179.0), (1000.0, -80.0), (180.0, 180.0)])
+def test_a_cut_command_turns_by_less_than_a_turn(heading, sent):
+    decisions = decide([[9.0, heading], [1.0, 0.25]], Commands.relative_deg)
+    assert decisions.filtered.values[0].tolist() == [2.0, sent]
+
+
+@pytest.mark.parametrize("speed", [2.0, 2.0 + 1e-9, math.nextafter(2.0, 3.0), 0.0, -0.0, -1e-12])
+def test_the_limits_themselves_pass_bit_for_bit(speed):
+    wanted = Commands.absolute_rad([[speed, 0.5], [1.0, 0.25]])
+    decisions = Shield().decide(fleet_of(ALONE, (0, 0)), wanted)
+    assert bits(decisions.filtered.values) == bits(wanted.values)
+    assert decisions.reason.tolist() == [Reason.PASSED] * 2
+
+
+@pytest.mark.parametrize("make", [Commands.relative_deg, Commands.absolute_rad, Commands.absolute_deg])
+@pytest.mark.parametrize(
+    ("speed", "heading"), [(math.nan, 0.5), (math.inf, 0.5), (2e6, 0.5), (-2e6, 0.5), (9.0, math.nan), (9.0, math.inf)]
+)
+def test_what_is_no_command_is_held(make, speed, heading):
+    first = decide([[speed, heading], [1.0, 0.25]], make)[0]
+    assert (first.reason, first.filtered_speed_mps) == (Reason.HELD, 0.0)
+
+
+def test_a_cut_command_that_is_not_safe_is_changed_for_that():
+    meeting = fleet_of([(0, 0, 0.0, 2.0), (0, 5.5, 180.0, 2.0)], (0, 1))
+    cut, plain = (
+        Shield().decide(meeting, Commands.absolute_rad([[speed, 0.0], [2.0, math.pi]]))[0] for speed in (7.0, 2.0)
+    )
+    assert cut.reason == plain.reason != Reason.LIMITED
+    assert (cut.filtered_speed_mps, cut.filtered_heading_rad) == (plain.filtered_speed_mps, plain.filtered_heading_rad)
+
+
+def test_both_ways_of_deciding_keep_the_limits_of_own_boats_and_leave_others_alone():
+    shield = Shield(coordination="per_boat")
+    decisions = shield.decide(fleet_of(ALONE, (0, 0)), Commands.absolute_rad([[5.0, 0.5], [-1.0, 0.0]]))
+    assert decisions.filtered.values[:, 0].tolist() == [2.0, 0.0]
+    decisions = decide([[9.0, 0.5], [9.0, 0.25]], Commands.absolute_rad, team=(0, 1))
+    assert decisions.reason.tolist() == [Reason.LIMITED, Reason.NOT_COVERED]
+    assert decisions.filtered.values[:, 0].tolist() == [2.0, 9.0]
+
+
+def test_commands_of_a_game_pass_as_they_are():
+    wanted = Commands.game_deg([[7.0, 20.0], [-1.0, 0.0]])
+    decisions = Shield().decide(fleet_of(ALONE, (0, 0)), wanted)
+    assert bits(decisions.filtered.values) == bits(wanted.values)
+    assert decisions.reason.tolist() == [Reason.PASSED] * 2
+    batch = BatchedShield(ShieldConfig(), 1, ("heron", "heron"), (0, 0))
+    state = np.nan_to_num(fleet_of(ALONE, (0, 0)).state[None])
+    assert bits(batch.decide(state, wanted.values[None], np.ones((1, 2), bool))[0]) == bits(wanted.values)
+
+
+def seen(**changes):
+    headings = {} if "heading_deg" in changes else {"heading_rad": [0.0, 3.0]}
+    good = {"position_m": [[0.0, 0.0], [30.0, 9.0]], "speed_mps": [1.0, 2.0], "team": [0, 1], "platforms": "heron"}
+    return Fleet.of(**{**good, **headings, **changes})
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: seen(heading_rad=[0.0, 90.0]), "90 rad, 14.3 turns; if these are degrees give heading_deg"),
+        (lambda: seen(heading_rad=np.array([-170, 20])), "if these are degrees give heading_deg"),
+        (lambda: Commands.absolute_rad([[1.0, 270.0]]), "if these are degrees give Commands.absolute_deg"),
+        (lambda: Commands(np.array([[1, 45]]), False), "if these are degrees give Commands.absolute_deg"),
+        (lambda: seen(position_m=[[-71.05, 42.36], [-71.0501, 42.36]]), "if these are degrees, give metres east"),
+        (
+            lambda: Shield().decide(seen(), Commands.absolute_rad([[math.pi, 1.0], [1.0, 0.0]])),
+            r"3.14159 m/s is wanted of boat 'boat_0', whose platform does 0 to 2 m/s.* Rows are \(speed m/s, heading\)",
+        ),
+    ],
+)
+def test_what_looks_like_another_unit_is_told_once_with_the_call_that_is_right(make, words, caplog, monkeypatch):
+    monkeypatch.setattr(arrays, "_said", set())
+    with caplog.at_level(logging.WARNING, logger="steerclear"):
+        make()
+        make()
+    (message,) = caplog.messages
+    assert re.search(words, message)
+
+
+def test_what_is_right_needs_no_word(caplog, monkeypatch):
+    monkeypatch.setattr(arrays, "_said", set())
+    with caplog.at_level(logging.WARNING, logger="steerclear"):
+        seen(heading_rad=[-math.pi, 3.0 * math.pi])
+        seen(heading_deg=[-180.0, 350.0])
+        seen(position_m=[[5.0, 5.0], [5.0, 5.0]])  # on one point, as drawn scenes may be
+        seen(position_m=[[0.0, 0.0], [0.0, 0.5]])
+        Commands.absolute_deg([[1.0, 350.0], [1.0, -90.0]])
+        Commands.absolute_rad([[1.0, math.nan], [1.0, math.inf]])
+        Shield().decide(seen(), Commands.game_deg([[9.0, 90.0], [1.0, 0.0]]))
+    assert caplog.messages == []

@@ -11,7 +11,6 @@ from shield_scenes import bits, fleet_of, relative
 from steerclear.shield import Reason, Shield, ShieldConfig, Surroundings
 from steerclear.shield.batch import BatchedShield
 from steerclear.shield.commands import Commands
-from steerclear.shield.decision import Decisions
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.workspace import OURS
 
@@ -53,9 +52,10 @@ def test_a_single_decision_is_a_batch_of_one_bit_for_bit(delay_s):
 
 
 @pytest.mark.parametrize("threads", [2, 3, 9])
-def test_threads_share_the_games_of_a_batch_and_decide_the_same_bits(threads):
-    config = ShieldConfig(delay_s=0.2)
-    alone, shared = (BatchedShield(config, 7, ("heron",) * 5, TEAM, threads=k) for k in (1, threads))
+def test_threads_share_the_games_of_a_batch_and_another_goes_on_from_what_it_remembered(threads):
+    """Without what is remembered the same states and commands are decided otherwise, so it does matter."""
+    config, otherwise = ShieldConfig(delay_s=0.2), 0
+    alone, shared, late, fresh = (BatchedShield(config, 7, ("heron",) * 5, TEAM, threads=k) for k in (1, threads, 1, 1))
     states = np.stack([crowd(seed).state for seed in range(7)])
     ours, more = np.tile(np.array(TEAM) == 0, (7, 1)), states.copy()
     for step in range(40):
@@ -64,13 +64,19 @@ def test_threads_share_the_games_of_a_batch_and_decide_the_same_bits(threads):
         assert bits(sent) == bits(shared.decide(more, wanted, ours))
         assert bits(alone.safety_margin_m) == bits(shared.safety_margin_m)
         assert (alone.reason == shared.reason).all()
+        if step > 20:
+            assert bits(late.decide(states, wanted, ours)) == bits(sent)
+            otherwise += (fresh.decide(states, wanted, ours) != sent).any()
         step_all(packed(("heron",) * 5), states, sent, 0.1)
         more[:] = states
         if step == 20:
+            for name, values in late.remembered.items():
+                values[...] = alone.remembered[name]
             shared = copy.deepcopy(shared)
-            alone.reset(np.arange(7) > 4)
-            shared.reset(np.arange(7) > 4)
+            for batch in (alone, shared, late):
+                batch.reset(np.arange(7) > 4)
     assert (alone.reason != Reason.PASSED).any()
+    assert otherwise > 0
 
 
 @pytest.mark.parametrize("threads", [0, -1, 1.5, True, None])
@@ -79,19 +85,19 @@ def test_no_number_of_threads_is_refused(threads):
         BatchedShield(ShieldConfig(), 2, ("heron",) * 5, TEAM, threads=threads)
 
 
-def told(coordination, **more) -> Decisions:
-    fleet = replace(crowd(3), **more)
-    return Shield(coordination=coordination).decide(fleet, relative(*[(2.0, 10.0)] * 5))
-
-
 def test_boats_that_are_not_ours_decide_nothing_and_are_feared_alike():
-    team, each = told("team"), told("per_boat")
+    shields = [Shield(coordination=coordination) for coordination in ("team", "per_boat")]
+    team, each = (shield.decide(crowd(3), relative(*[(2.0, 10.0)] * 5)) for shield in shields)
     np.testing.assert_array_equal(team.adversary_horizon_s, each.adversary_horizon_s)
     assert np.isnan(team.adversary_horizon_s[:3]).all()
     assert (team.adversary_horizon_s[3:] > 0.0).all()
-    shield = Shield(coordination="per_boat")
-    shield.decide(crowd(3), relative(*[(2.0, 10.0)] * 5))
-    assert (shield._deciders.scene.given[:, :, OURS] != 0.0).any(axis=1).tolist() == [True, True, True, False, False]
+    assert (shields[1]._deciders.scene.given[:, :, OURS] != 0.0).any(axis=1).tolist() == [
+        True,
+        True,
+        True,
+        False,
+        False,
+    ]
     assert (each.reason[3:] == Reason.NOT_COVERED).all()
 
 
@@ -139,23 +145,3 @@ def test_whatever_is_wanted_and_wherever_boats_are_what_is_sent_is_a_command(del
             assert np.isfinite(decisions.slack_m).all()
             if not np.isfinite(value):
                 assert (decisions.reason[own] != Reason.PASSED).all()
-
-
-def test_a_batch_goes_on_from_what_another_remembered():
-    """Without it the same states and commands are decided otherwise, so the copies do matter."""
-    make = lambda: BatchedShield(ShieldConfig(delay_s=0.2), 8, ("heron",) * 5, TEAM)  # noqa: E731
-    first, second, third = make(), make(), make()
-    states = np.stack([crowd(seed).state for seed in range(8)])
-    ours = np.tile(crowd(0).controlled, (8, 1))
-    otherwise = 0
-    for step in range(40):
-        wanted = np.random.default_rng(step).uniform([0.0, -90.0], [2.0, 90.0], (8, 5, 2))
-        if step == 20:
-            for name, values in second.remembered.items():
-                values[...] = first.remembered[name]
-        sent = first.decide(states, wanted, ours).copy()
-        if step >= 20:
-            assert bits(second.decide(states, wanted, ours)) == bits(sent)
-            otherwise += (third.decide(states, wanted, ours) != sent).any()
-        step_all(packed(("heron",) * 5), states, sent, 0.1)
-    assert otherwise > 0

@@ -74,7 +74,7 @@ def test_the_place_foreseen_is_where_the_game_puts_the_boat(steps, platform):
         observations, *_, infos = env.step({**actions, **red.act(observations, infos)})
         now = env.core.state[0, :, :2]
         assert np.hypot(*(foreseen[:, :2] - now).T)[ours].max(initial=0.0) < SAME_M
-        after, stride = [*places[1:], now], blue.shield._boats.stride
+        after, stride = [*places[1:], now], work.boats.stride
         upper = np.array([places[0][:, 1] > 40.0, now[:, 1] > 40.0])  # the nearer corner is driven to: it may change
         for j in np.flatnonzero(known & (upper[0] == upper[1])):
             driven += 1

@@ -27,8 +27,7 @@ def scene(seed, platform="heron", ours=3, others=3, side_m=14.0):
 
 def listed(fleet, rows):
     """The same boats in another order."""
-    rows = list(rows)
-    taken = {name: getattr(fleet, name)[rows] for name in ("state", "team", "controlled")}
+    taken = {name: getattr(fleet, name)[list(rows)] for name in ("state", "team", "controlled")}
     texts = {name: tuple(getattr(fleet, name)[i] for i in rows) for name in ("platforms", "names")}
     return replace(fleet, **taken, **texts)
 
@@ -88,4 +87,6 @@ def test_where_a_scene_lies_and_which_way_it_faces_changes_hardly_anything(platf
     ],
 )
 def test_names_are_ordered_by_the_numbers_in_them(names, order):
-    assert order_of(names).tolist() == order
+    found, place = order_of(names)
+    assert found.tolist() == order
+    assert [names[order[k]] for k in place] == list(names)

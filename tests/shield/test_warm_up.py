@@ -1,26 +1,14 @@
 """Everything is compiled before the first decision, and nothing is remembered of it."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from shield_scenes import signatures
-from steerclear.shield import Commands, Fleet, Shield, decide, shield
+from shield_scenes import head_on, signatures
+from steerclear.shield import Commands, Shield, decide, shield
 from steerclear.shield.exceptions import PlatformError
 
-
-def head_on(platform="heron", speed_mps=2.0):
-    fleet = Fleet.of(
-        position_m=[[0, 0], [0, 5.5]],
-        heading_rad=[0, math.pi],
-        speed_mps=[speed_mps] * 2,
-        team=[0, 1],
-        platforms=platform,
-    )
-    return fleet, Commands.relative_deg(np.array([[speed_mps, 0.0]] * 2))
-
-
+AHEAD = Commands.relative_deg(np.array([[2.0, 0.0]] * 2))
 STAGES = "begin", "begin_group", "linearise", "accept", "end_group", "end"
 
 
@@ -46,29 +34,23 @@ def test_decisions_are_the_same_with_and_without(coordination):
     told = []
     for warm in (False, True):
         guard = Shield(coordination=coordination, delay_s=0.2)
-        fleet, wanted = head_on()
-        before = [guard.decide(fleet, wanted).filtered.values]
+        fleet = head_on(5.5)
+        before = [guard.decide(fleet, AHEAD).filtered.values]
         if warm:
             guard.warm_up(fleet)
-        before += [guard.decide(fleet, wanted).filtered.values for _ in range(3)]
+        before += [guard.decide(fleet, AHEAD).filtered.values for _ in range(3)]
         told.append(np.array(before))
     np.testing.assert_array_equal(*told)
 
 
-def test_a_fleets_tables_are_read(monkeypatch):
+def test_a_fleets_tables_are_read_and_unknown_boats_refused(monkeypatch):
     read = []
     boats_of = shield.boats_of
     monkeypatch.setattr(shield, "boats_of", lambda *values: (read.append(values[1]), boats_of(*values))[1])
-    fleet, _ = head_on("surveyor", 3.0)
-    Shield().warm_up(fleet)
-    assert fleet.platforms in read
-
-
-def test_a_fleet_of_unknown_boats_is_refused():
-    fleet, _ = head_on()
-    fleet = replace(fleet, platforms=("raft", "raft"))
+    Shield().warm_up(head_on(5.5, "surveyor"))
+    assert ("surveyor",) * 2 in read
     with pytest.raises(PlatformError, match="raft"):
-        Shield().warm_up(fleet)
+        Shield().warm_up(replace(head_on(), platforms=("raft", "raft")))
 
 
 @pytest.mark.parametrize("settings", [{}, {"position_error_m": 0.3, "delay_s": 0.2}, {"separation_m": 4.0}])

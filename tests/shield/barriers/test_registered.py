@@ -15,7 +15,7 @@ import pytest
 from shield_loops import fill, packed, sail, sail_games
 from steerclear.experiments.conformance import NotConforming, check_barrier
 from steerclear.experiments.entries.package import game_spec
-from steerclear.shield import Commands, Fleet, Reason, Shield, ShieldConfig, Surroundings, hints
+from steerclear.shield import Commands, Fleet, Reason, Shield, ShieldConfig, Surroundings, arrays
 from steerclear.shield.backup.paths import SAG_M
 from steerclear.shield.barriers import Barrier, register_barrier, registry
 from steerclear.shield.batch import BatchedShield
@@ -34,7 +34,7 @@ def ferrys(x_m, y_m, ahead_s, ferry):
 @pytest.fixture(autouse=True)
 def nothing_stays_registered(monkeypatch):
     monkeypatch.setattr(registry, "BARRIERS", {})
-    monkeypatch.setattr(hints, "_said", set())
+    monkeypatch.setattr(arrays, "_said", set())
 
 
 class Ferry:

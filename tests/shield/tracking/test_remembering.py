@@ -9,7 +9,6 @@ from shield_loops import fill, packed, step_all
 from shield_scenes import bits, fleet_of, head_on, relative
 from steerclear.shield import Fleet, Shield
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.shield import order_of
 from steerclear.shield.workspace import BACKUP_MARGIN, HAS_BACKUP, N_MEMORY
 
 FAR_AWAY = (1300.0, 0.0, 0.0, 0.0)
@@ -25,9 +24,9 @@ def meeting(platforms="heron"):
 
 def part(fleet, boats):
     """Only some boats of a fleet, in that order."""
-    chosen = list(boats)
-    platforms, names = (tuple(entry[k] for k in chosen) for entry in (fleet.platforms, fleet.names))
-    return Fleet(fleet.state[chosen].copy(), fleet.team[chosen], platforms, fleet.controlled[chosen], names)
+    rows = list(boats)
+    platforms, names = (tuple(entry[k] for k in rows) for entry in (fleet.platforms, fleet.names))
+    return Fleet(fleet.state[rows].copy(), fleet.team[rows], platforms, fleet.controlled[rows], names)
 
 
 def decisions(shield, fleet, seen_at):
@@ -86,7 +85,7 @@ def test_boats_are_told_by_name_platform_and_team(change, forgotten):
     fleet = replace(meeting(), controlled=np.array([True, True, True]))
     shield, kept = Shield(), []
     shield.decide(fleet, relative((2.0, 30.0), (2.0, 30.0), (0.0, 0.0)))
-    shield._deciders_of(other := replace(fleet, **change), order_of(other.names))
+    shield._deciders_of(replace(fleet, **change), shield._static(shield.surroundings))
     kept = memory_of(shield)[:, HAS_BACKUP]
     assert np.flatnonzero(kept == 0.0).tolist() == forgotten
 
@@ -98,7 +97,7 @@ def test_a_boat_that_meets_a_new_one_keeps_its_backup_but_no_margin(gap_m, met):
     shield.decide(part(fleet, (0, 1)), relative((2.0, 0.0), (2.0, 0.0)))
     before = memory_of(shield)
     assert before[0, BACKUP_MARGIN] > 0.0
-    shield._deciders_of(fleet, order_of(fleet.names))
+    shield._deciders_of(fleet, shield._static(shield.surroundings))
     after = memory_of(shield)
     assert after[0, BACKUP_MARGIN] == (0.0 if met else before[0, BACKUP_MARGIN])
     alike = [k for k in range(N_MEMORY) if k != BACKUP_MARGIN]
