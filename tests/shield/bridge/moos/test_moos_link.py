@@ -122,8 +122,10 @@ def test_nominal_commands_come_through_and_silence_of_a_second_is_a_stop(world, 
     community.post("IVPHELM_ALLSTOP", "clear", "pHelmIvP")
 
 
-def test_checks_tell_what_is_there_and_what_nobody_can_know(world):
+def test_checks_tell_what_is_there_and_what_nobody_can_know(world, community):
     _, link, _ = world
+    community.post("DESIRED_HEADING", 270.0, "pBehave")
+    assert until(lambda: link.other_commander()[0] == "pBehave")
     results = {result.name: result for result in run_checks(moos_checks({"blue_1": link}, FLEET, 1.0))}
     assert results["moosdb:blue_1"].passed, results["moosdb:blue_1"].text
     assert results["grid:blue_1"].passed, results["grid:blue_1"].text
