@@ -111,18 +111,7 @@ def write_entry_page(
     links: Sequence[tuple[str, str]],
     warnings: Sequence[str],
 ) -> Path:
-    """Write the page.
-
-    Args:
-        rows: the games.
-        settings: what was played.
-        folder: where to.
-        links: label and file name of each game to look at, and of what else there is.
-        warnings: sentences that a reader has to know first.
-
-    Returns:
-        The path written.
-    """
+    """Write the page of the games, with links (label, file name) to what there is to look at, and warnings first."""
     groups = by_opponent(rows, settings)
     page = render(
         "entry.html",

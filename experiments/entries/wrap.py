@@ -41,14 +41,9 @@ EPOCH = (2020, 1, 1, 0, 0, 0)
 def wrap_entry(entry: str, out: Path, preset: str, shield: dict[str, Any]) -> dict[str, Any]:
     """Write a shielded zip of an entry that plays, and try that it loads.
 
-    Args:
-        entry: folder or zip with ``solution.py``.
-        out: the zip to write.
-        preset: rules of the game it is for.
-        shield: settings of the shield that are not the default.
-
     Returns:
-        What `docs_keys.ENTRY_WRAP` describes, and as ``tried`` what `check.check_entry` found of the entry.
+        What the keys of "entry wrap" describe, and as ``tried`` what `check.check_entry` found of the entry: a shield
+        would hide that it gave nothing usable.
     """
     if out.suffix != ".zip":
         raise ConfigError(f"--out is {out}; give the name of a zip, such as shielded.zip")

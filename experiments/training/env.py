@@ -81,20 +81,14 @@ class AskedShield:
 class TrainEnv(MctfVecEnv):
     """Every blue boat of every game is a learner; opponents, rewards, shield and rules are those of the stage.
 
-    Where networks are told places or each place has its own, observations end in the boat's place, one-hot.
-
-    Args:
-        config: of the training.
-        first: network that decides where nobody of the team holds the flag. What the learner chose there changes
-            nothing, so that what it learns from it is zero on average.
+    Where networks are told places or each place has its own, observations end in the boat's place, one-hot. Where
+    nobody of the team holds the flag the network ``first`` decides, if there is one. What the learner chose there
+    changes nothing, so that what it learns from it is zero on average.
 
     Attributes:
         batch: the games of the stage under way.
         stage: its number.
         spent_s: time in the games, s, shield included.
-
-    Raises:
-        ConfigError: the rules of a stage change what boats see, or a setting, reward or opponent cannot be.
     """
 
     def __init__(self, config: Config, first: Any = None) -> None:

@@ -70,6 +70,14 @@ def test_red_plays_as_blue_turned_round(name):
     np.testing.assert_allclose(found[0], found[1], atol=1e-9)
 
 
+def test_ohto_holds_near_its_base_and_never_grabs():
+    _, env = play("ohto", steps=900)
+    before = env.core.state[0, :3, :2].copy()
+    assert (np.linalg.norm(before - env.core.flag_home[0], axis=1) < 20.0).all()
+    assert (env.core.state[0, :3, 3] < 0.05).all()
+    assert env.core.grabs.sum() == 0
+
+
 @pytest.mark.parametrize("preset", PRESETS)
 def test_ohto_holds_the_row_in_which_the_presets_start_boats(preset):
     """Also where a game starts them elsewhere, in disorder and bunched beside the flag: no way is left open."""

@@ -26,6 +26,16 @@ def test_at_the_meeting_time_the_target_is_as_far_as_the_rammer_gets(east, north
     assert abs(reached) <= 1e-6 * (1.0 + distance) or time == pytest.approx(guess)
 
 
+@settings(deadline=None)
+@given(near, near, slow, slow, st.floats(0.1, 3.0))
+def test_no_earlier_meeting_is_missed(east, north, v_east, v_north, speed):
+    time = meeting_time_s(east, north, v_east, v_north, speed)
+    for earlier in np.linspace(0.0, 0.999, 40) * min(time, 30.0):
+        gap = math.hypot(east + v_east * earlier, north + v_north * earlier) - speed * earlier
+        if math.hypot(east, north) > 1e-6 and time < 30.0 and time != pytest.approx(math.hypot(east, north) / speed):
+            assert gap > -1e-6
+
+
 @pytest.mark.parametrize(
     ("case", "expected"),
     [

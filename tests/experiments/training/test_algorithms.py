@@ -12,7 +12,7 @@ from steerclear.experiments.training.qmix import MonotoneMixer
 from steerclear.experiments.training.training import training_of
 from steerclear.policies import make_batch
 from steerclear.policies.entrants.learned import read_weights
-from steerclear.policies.entrants.learned.cloned import read_chooser
+from steerclear.policies.entrants.learned.cloned import OPTION_NAMES, Chooser, read_chooser
 from steerclear.policies.entrants.learned.network import Features, Network, joined, write_weights
 from steerclear.shield.exceptions import ConfigError, PolicyError
 from typer.testing import CliRunner
@@ -28,6 +28,27 @@ def test_a_clone_agrees_with_a_rule_it_was_shown():
         rows.append({"time_s": 0.0, "option": "attack" if x + y > 60 else "guard", "own_x": x, "own_y": y})
     _, curve = fitted(rows, CloningOptions(epochs=60, rate=1e-2, hidden=16, batch=64), 0, {})
     assert curve[-1]["agrees"] > 0.93
+
+
+def test_gradients_are_those_of_finite_differences():
+    rng = np.random.default_rng(1)
+    chooser = Chooser.fresh(["a", "b"], 4, rng, {})
+    seen, chosen = rng.normal(size=(7, 2)), rng.integers(0, len(OPTION_NAMES), 7)
+
+    def loss():
+        values = chooser.values(seen)
+        top = values.max(1, keepdims=True)
+        logs = values - top - np.log(np.exp(values - top).sum(1, keepdims=True))
+        return -logs[np.arange(7), chosen].mean()
+
+    for array, gradient in zip(chooser.parameters(), chooser.gradients(seen, chosen), strict=True):
+        at = tuple(0 for _ in array.shape)
+        array[at] += 1e-6
+        above = loss()
+        array[at] -= 2e-6
+        below = loss()
+        array[at] += 1e-6
+        assert gradient[at] == pytest.approx((above - below) / 2e-6, abs=1e-7)
 
 
 def test_cloning_ends_in_a_chooser_that_can_be_read(tiny, tmp_path):

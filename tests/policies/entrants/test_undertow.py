@@ -408,3 +408,17 @@ def test_it_brings_a_flag_home_from_easy_with_a_patrol_before_it_whose_habit_it_
         observations, _, _, _, infos = env.step(actions)
     assert env.core.captures[0].tolist() == [0, 1]
     assert any(teams[1]._raid.watch.habits.settled(number) for number in range(3))
+
+
+@pytest.mark.parametrize(("name", "some"), [("chao", True), ("medium", False)])
+def test_of_the_opponents_those_that_never_chase_keep_a_habit(name, some):
+    """Circling boats do; guards and attackers that see us do not, with a team that sails about."""
+    env = MctfEnv(GameConfig.preset("aamas2024", default_start=False), action_kind="continuous")
+    observations, infos = env.reset(seed=3)
+    own, foes = policies.make("undertow"), policies.make(name)
+    own.reset(env, env.possible_agents[:3], 1)
+    foes.reset(env, env.possible_agents[3:], 2)
+    while env.core.time_s[0] < 75.0:
+        actions = own.act(observations, infos) | foes.act(observations, infos)
+        observations, _, _, _, infos = env.step(actions)
+    assert any(own._raid.watch.habits.settled(number) for number in range(3)) == some
