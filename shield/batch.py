@@ -129,7 +129,7 @@ class BatchedShield:
             ours: (B, n) boats to decide for.
             visiting: (B, n) boats on the other team's side, see `Fleet.visiting`; None: of none it is known.
             driven: (B, n, 4) of boats that the games drive, see `Fleet.driven`; rows of NaN, or None, where nothing is
-                known. Those not decided for are foreseen as such.
+                known. Those not decided for are predicted as such.
 
         Returns:
             (B, n, 2) commands; rows of boats not decided for, and of those that pass, bit for bit as wanted. The

@@ -69,11 +69,11 @@ class Fleet:
         position_error_m: (n,) bound on each position's error, m; None: as in the settings.
         driven: (n, 4) of boats that something drives whose doing is known (a game, of tagged or disabled ones): speed
             m/s, the place x, y m it steers at (NaN: none, the rudder is left alone) and the time, s, for which that is
-            sure to last; a row of NaN where nothing is known. None: of no boat. They are foreseen as such, see
+            sure to last; a row of NaN where nothing is known. None: of no boat. They are predicted as such, see
             `barriers.neighbours`, unless they may be free before a backup ends, or are controlled.
         adversary_horizon_s: (n,) how long from now each may do its worst as an opponent before it holds its course, s;
-            NaN, or None for all: as the settings say; where `ShieldConfig.adversary_horizon_s` is 0 nobody is feared.
-        visiting: (n,) boats on the other team's side of a field, where they can tag nobody: they are feared for
+            NaN, or None for all: as the settings say; where `ShieldConfig.adversary_horizon_s` is 0 nobody is.
+        visiting: (n,) boats on the other team's side of a field, where they can tag nobody: adversarial for
             `ShieldConfig.intruder_horizon_s`. None: of none it is known.
 
     Raises:
