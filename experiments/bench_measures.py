@@ -124,7 +124,7 @@ def questions_of_games(preset: str, game_s: float, seed: int, config: ShieldConf
         rules = {"max_time_s": game_s}
         match = Match(MatchSpec(preset, "medium", opponent, game=number, seed=number, shield={}, rules=rules))
         keeping = _KeepingShield(replace(config, dt_s=match.env.config.dt_s))
-        match.shielding.env.shield = keeping
+        match.shielding.env._game.shield = keeping
         match.play()
         match.close()
         found.append(keeping.questions)

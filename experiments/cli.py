@@ -20,7 +20,7 @@ from .cli_reach import app as reach_app
 from .cli_tools import bench, compare, docs, parity, platforms_app, render, warm_up
 from .cli_tournament import tournament
 from .cli_train import export, train, train_study
-from .console import EXIT_CODES, App, command, leave_failed
+from .console import EXIT_CODES, App, leave_failed
 from .provenance import package_version
 from .terminal import prepare
 
@@ -35,10 +35,7 @@ BASE = (
     *(play, evaluate, ablate, compare, tournament, demonstrate, train, export, encounters, attack, parity, bench),
     *(render, docs, warm_up, train_study),
 )
-OF_BOATS = {
-    "cli_boats": ("deploy", "preflight", "referee", "sea-trial"),
-    "cli_logs": ("replay", "fit", "sim-boats"),
-}
+OF_BOATS = {"cli_boats": ("deploy", "preflight", "referee", "sea-trial"), "cli_logs": ("replay", "fit", "sim-boats")}
 """Commands that need the extra ``[boats]``, by their module."""
 
 
@@ -61,7 +58,6 @@ def _add_refusal(name: str, lacking: ConfigError) -> None:
     anything: dict[str, Any] = {"ignore_unknown_options": True, "allow_extra_args": True, "help_option_names": []}
 
     @app.command(name, context_settings=anything, help=escape(f"Not installed: {lacking}"))
-    @command()
     def refuse(context: typer.Context) -> None:
         raise lacking
 

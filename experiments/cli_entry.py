@@ -15,7 +15,7 @@ from . import cli_options as o
 from .ablation import quick as small_version
 from .ablation import spec_of
 from .cli_games import end_run, run_games
-from .console import App, command, finish, progress, say, warn
+from .console import App, finish, progress, say, warn
 from .entries.check import always_late, check_entry, headline
 from .entries.report_page import EntryGames, games_to_look_at, shielded_zip, write_entry_page
 from .entries.team import is_entry
@@ -44,7 +44,6 @@ def check_path(entry: str) -> None:
 
 
 @app.command()
-@command()
 def check(
     entry: Entry,
     preset: o.Preset = "mctf2026",
@@ -106,8 +105,7 @@ class ReportedGames(o.GamesOptions):
     judge: o.Judge = "none"
 
 
-@app.command()
-@command(preset="mctf2026")
+@app.command(defaults={"preset": "mctf2026"})
 def report(
     entry: Entry,
     game: o.RuleOptions,
@@ -172,7 +170,6 @@ def _write_page(settings: EntryGames, run: Run, results: dict[str, Any], looks: 
 
 
 @app.command()
-@command()
 def wrap(
     entry: Entry,
     kept: o.KeptOptions,

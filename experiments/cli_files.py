@@ -60,9 +60,9 @@ def check_files(function: Callable[..., Any], given: Mapping[str, Any]) -> None:
             if path.name in OURS and path.resolve().parent in folders:
                 words = f"is what the command writes into {path.parent} itself; leave it out, or name another"
                 raise ConfigError(f"{option} {path} {words}")
-        for path in () if given.get("resume") else value if isinstance(value, list) else (value,):
-            check_new(path, option)
-            check_place(path, option)
+        for place in () if given.get("resume") else value if isinstance(value, list) else (value,):
+            check_new(place, option)
+            check_place(place, option)
 
 
 def written_by(function: Callable[..., Any]) -> list[str]:

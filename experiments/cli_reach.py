@@ -18,7 +18,7 @@ from steerclear.shield.tables.solve import Notice
 
 from . import cli_options as o
 from .cli_games import met
-from .console import App, Interrupted, bars, command, finish, out, progress, say
+from .console import App, Interrupted, bars, finish, out, progress, say
 from .reach import pages as P
 from .reach.sets import PlayedSet, compare_sets, looks_up, places, played_experiment, sets_config
 from .result_files import NEW, check_new, write_json
@@ -45,7 +45,6 @@ Picture = Annotated[Path | None, o.option("FILE", "Also draw the sets, as PNG or
 
 
 @app.command()
-@command()
 def solve(
     boats: BoatOptions,
     other_may: OtherMay = "worst-case",
@@ -93,7 +92,6 @@ def solve(
 
 
 @app.command()
-@command()
 def show(
     boats: BoatOptions,
     other_may: OtherMay = "worst-case",
@@ -127,7 +125,6 @@ def show(
 
 
 @app.command()
-@command()
 def compare(
     boats: BoatOptions, radius: Radius = 2.5, shield_set: o.ShieldSet = None, json_file: o.JsonFile = None
 ) -> None:
@@ -161,7 +158,6 @@ def _show(
 
 
 @app.command()
-@command()
 def play(
     boats: BoatOptions,
     radius: Radius = 2.5,
@@ -196,7 +192,6 @@ def play(
 
 
 @app.command()
-@command()
 def check(
     files: Annotated[
         list[Path] | None, typer.Argument(help="Table files.", show_default="all shipped and cached ones")

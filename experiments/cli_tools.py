@@ -251,7 +251,6 @@ def _platform_of(name: str) -> PlatformFile:
 
 
 @platforms_app.command("show")
-@command()
 def show_platform(
     name: Annotated[str | None, typer.Argument(metavar="[NAME|FILE]", show_default="all entries")] = None,
 ) -> None:
@@ -274,7 +273,6 @@ def show_platform(
 
 
 @platforms_app.command("check")
-@command()
 def check_platform(
     name: Annotated[str, typer.Argument(metavar="NAME|FILE", help="A platform's name, or the path of its file.")],
 ) -> None:
@@ -287,7 +285,6 @@ def check_platform(
 
 
 @platforms_app.command("new")
-@command()
 def new_platform(
     name: Annotated[str, typer.Argument(metavar="NAME", help="Of the boat.")],
     begin: Annotated[str, o.option("NAME", "The platform to begin with.", "--from")] = ("ardurover_boat"),

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -20,7 +18,7 @@ from . import cli_options as o
 from .cli_files import check_ending
 from .console import Interrupted, bars, command, progress, say, warn
 from .entries.wrap import write_submission
-from .result_files import NEW, lock_folder, make_folder
+from .result_files import NEW, lock_folder
 from .runner import RESULTS_FILE
 from .training.config import read_config
 from .workers import processes_of
@@ -51,13 +49,14 @@ def train(
     for name in () if resume else (CONFIG, *WRITTEN):
         if (folder / name).exists() and not (name == CONFIG and kept.samefile(config)):
             raise ConfigError(f"{folder / name} would be written over; name another --out, or move it")
-    with _own(folder):
-        from .training.training import training_of
+    lock = lock_folder(folder)
+    from .training.training import training_of
 
-        training = training_of(settings, folder, resume)
-        if not (kept.exists() and kept.samefile(config)):
-            copyfile(config, kept)
-        _run(training, folder)
+    training = training_of(settings, folder, resume)
+    if not (kept.exists() and kept.samefile(config)):
+        copyfile(config, kept)
+    _run(training, folder)
+    del lock
     say(*(folder / name for name in WRITTEN if (folder / name).exists()))
 
 
@@ -65,18 +64,6 @@ def _check_extra() -> None:
     """Refuse what learns where the extra is not installed."""
     if find_spec("torch") is None or find_spec("stable_baselines3") is None:
         raise ConfigError(f"training needs torch and stable-baselines3; {install_command('train')}")
-
-
-@contextmanager
-def _own(folder: Path) -> Iterator[None]:
-    """Make a folder, in which no other may write meanwhile."""
-    make_folder(folder)
-    try:
-        lock = lock_folder(folder)
-    except OSError as error:
-        raise ConfigError(f"cannot write to {folder} ({error.strerror}); choose another --out") from error
-    yield
-    del lock
 
 
 def _run(training: Any, folder: Path) -> None:

@@ -89,6 +89,9 @@ def warn(text: str) -> None:
 
 ALL = "steerclear.help_all"
 """Key of a context in which help shows every option."""
+Made = Callable[[Callable[..., Any]], Callable[..., Any]]
+_MADE = set[Callable[..., Any]]()
+"""What `command` made."""
 
 
 class OnceCommand(TyperCommand):
@@ -133,14 +136,16 @@ class OnceCommand(TyperCommand):
 
 
 class App(typer.Typer):
-    """Commands of the kind `OnceCommand`."""
+    """Commands of the kind `OnceCommand`, made by `command`."""
 
-    def command(self, name: str | None = None, **settings: Any) -> Callable[..., Any]:
-        """As Typer's."""
-        return super().command(name, **{"cls": OnceCommand, **settings})
+    def command(self, name: str | None = None, *, defaults: dict[str, Any] | None = None, **settings: Any) -> Made:
+        """As Typer's; ``defaults``: see `command`."""
+        register = super().command(name, **{"cls": OnceCommand, **settings})
+        make = command(**(defaults or {}))
+        return lambda function: register(function if function in _MADE else make(function))
 
 
-def command(**defaults: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def command(**defaults: Any) -> Made:
     """Make a function a command: its options, its exit codes, its help.
 
     A parameter that is a dataclass is a group of options: each field becomes an option. Bad input ends in one line
@@ -179,6 +184,7 @@ def command(**defaults: Any) -> Callable[[Callable[..., Any]], Callable[..., Any
         vars(guarded)["__signature__"] = inspect.Signature(options)
         guarded.__annotations__ = {option.name: option.annotation for option in options}
         guarded.__doc__ = unbroken(function.__doc__ or "")
+        _MADE.add(guarded)
         return guarded
 
     return decorate
@@ -190,8 +196,9 @@ def _options_of(
     """Options of a function, and its groups of options by the name of the parameter."""
     hints, found, groups = hints_of(function), list[tuple[str, Any, Any]](), dict[str, type[Any]]()
     for name, parameter in inspect.signature(function).parameters.items():
-        if dataclasses.is_dataclass(hint := hints[name]):
-            groups[name] = hint
+        hint: Any = hints[name]
+        if dataclasses.is_dataclass(hint):
+            groups[name] = typing.cast("type[Any]", hint)
             fields = typing.get_type_hints(hint, include_extras=True)
             own = {one.name: one.default for one in dataclasses.fields(hint)} | defaults
             found += [(one.name, own[one.name], fields[one.name]) for one in dataclasses.fields(hint)]

@@ -99,7 +99,7 @@ def cells_of(content: Mapping[str, Any]) -> list[dict[str, Any]]:
     common = {key: settings[key] for key in (*CONDITIONS, "seed", "own", "other") if key in settings}
     common |= settings.get("conditions") or {}
     for raw in content.get("cells") or []:
-        cell = {**common, **raw, **(raw.get("conditions") or {}), **(raw.get("summary") or {})}
+        cell = {**common, **raw}
         if missing := [key for key in NEEDED if key not in cell]:
             raise ConfigError(f"a cell of the encounter results has no {', '.join(missing)}; run `encounters` again")
         cells.append(cell)
@@ -112,7 +112,7 @@ def contests_of(cells: Iterable[Cell]) -> list[Contest]:
     for cell in cells:
         conditions = tuple(float(cell[key]) for key in CONDITIONS)
         groups[cell["own"], cell["other"], conditions, cell["seed"]][cell["guard"]][cell["family"]] = cell
-    return [Contest(*who, by_guard) for who, by_guard in groups.items()]
+    return [Contest(own, other, conditions, seed, met) for (own, other, conditions, seed), met in groups.items()]
 
 
 def pool(cells: Sequence[Cell]) -> dict[str, Any]:

@@ -20,6 +20,9 @@ from steerclear.shield.jit import Array, BoolArray, kernel
 
 from .metrics import RADII_M, breach_column, game_metrics_of
 
+KINDS = {"teammate": 2, "opponent": 1}
+"""Kinds of pairs of a team, by how many of the two boats are its own."""
+
 
 @dataclass(frozen=True)
 class PairDistances:
@@ -52,37 +55,6 @@ class PairDistances:
     def closest_m(self) -> float:
         """Return the smallest distance, m; infinity where there is no pair or no step."""
         return float(self.distance_m.min(initial=np.inf))
-
-
-def entries(distances: PairDistances, radius_m: ArrayLike) -> NDArray[np.bool_]:
-    """Mark the steps (T, p), row t for step t + 1, at which a pair enters the radius.
-
-    Args:
-        distances: T steps, p pairs.
-        radius_m: one radius or one per pair; two boats at exactly this distance are inside.
-
-    Raises:
-        ConfigError: a radius that is not positive.
-    """
-    radii = np.asarray(radius_m, np.float64)
-    if not (radii > 0.0).all():
-        raise ConfigError(f"the separation radius must be positive, in metres; got {radii}")
-    inside = distances.distance_m <= radii
-    before = np.zeros_like(inside)
-    before[1:] = inside[:-1]
-    return inside & ~before
-
-
-def count_breaches(distances: PairDistances, radius_m: ArrayLike) -> int:
-    """Count the entries of all pairs into the radius (m, one or one per pair)."""
-    return int(entries(distances, radius_m).sum())
-
-
-def team_pairs(team: ArrayLike, side: int, kind: str) -> NDArray[np.bool_]:
-    """Choose the pairs (of `PairDistances.of`) of a team's boats, "teammate", or of one with another's, "opponent"."""
-    own = np.asarray(team, dtype=np.int64) == side
-    first, second = np.triu_indices(len(own), k=1)
-    return own[first] & own[second] if kind == "teammate" else own[first] != own[second]
 
 
 STILL_MPS = 0.2
@@ -126,9 +98,9 @@ def deadlocks(speed_mps: Array, wanted_mps: Array, own: BoolArray, longest: int,
 
 def count_deadlocks(speed_mps: Array, wanted_mps: Array, own: BoolArray, dt_s: float) -> int:
     """Count the deadlocks of one game's own boats (n,), from speeds after and wanted in each step (T, n)."""
-    speeds = (np.ascontiguousarray(one[:, None], dtype=np.float64) for one in (speed_mps, wanted_mps))
+    speed, wanted = (np.ascontiguousarray(one[:, None], dtype=np.float64) for one in (speed_mps, wanted_mps))
     found = np.empty(1)
-    deadlocks(*speeds, np.ascontiguousarray(own), round(DEADLOCK_S / dt_s), found)
+    deadlocks(speed, wanted, np.ascontiguousarray(own), round(DEADLOCK_S / dt_s), found)
     return int(found[0])
 
 
@@ -181,39 +153,55 @@ def scores(counts: Mapping[str, Any], penalty: float = DEFAULT_PENALTY) -> dict[
     }
 
 
-def tally(record: Record, side: int, radii_m: Sequence[float] = RADII_M) -> dict[str, Any]:
-    """Count for one team, 0 blue or 1 red.
+def tally(
+    record: Record, side: int, radii_m: Sequence[float] = RADII_M, driven: NDArray[np.bool_] | None = None
+) -> dict[str, Any]:
+    """Count for one team, 0 blue or 1 red; ``driven`` (T, n): boats that the game drove, which obey no policy.
 
     Returns:
-        Flat columns: ``breaches_teammate_2.5m`` and so on at each radius, ``closest_*_m`` (None without such a pair),
+        Flat columns: ``breaches_teammate_2.5m`` and so on at each radius, of them those of an own boat that was driven,
+        ``breaches_driven_2.5m``, ``breaches_driven_teammate_2.5m``; ``closest_*_m`` (None without such a pair),
         ``clean_games`` (none at the smallest radius), ``collisions`` (what the game's score counts), the columns of
         `shield_columns`, ``deadlocks`` and what metrics measure by themselves.
     """
-    meta = read_meta(record)
-    distances = PairDistances.of(record["position"])
-    own, dt_s = np.asarray(meta["team"]) == side, float(meta["dt_s"])
+    meta, position = read_meta(record), record["position"]
+    team, dt_s = np.asarray(meta["team"]), float(meta["dt_s"])
+    own, distances = team == side, PairDistances.of(position)
+    ours = own[distances.pairs].sum(axis=1)
+    closest = {kind: distances.of_pairs(ours == boats).closest_m() for kind, boats in KINDS.items()}
+    closest_m = {f"closest_{kind}_m": value if np.isfinite(value) else None for kind, value in closest.items()}
+    columns: dict[str, Any] = {}
+    for radius_m in radii_m:
+        rows = find_breaches(position, radius_m)[:, :3].astype(np.int64)
+        boats, in_it = rows[:, 1:], own[rows[:, 1:]]
+        hit = None if driven is None else (in_it & driven[rows[:, :1] - 1, boats]).any(axis=1)
+        for kind, count in KINDS.items():
+            of_kind = in_it.sum(axis=1) == count
+            columns[breach_column(kind, radius_m)] = int(of_kind.sum())
+            if hit is not None:
+                columns[breach_column(f"driven_{kind}", radius_m)] = int((hit & of_kind).sum())
+        if hit is not None:
+            columns[breach_column("driven", radius_m)] = int(hit.sum())
     return {
-        **_breach_columns(distances, meta, side, radii_m),
-        # the game looks for collisions after every decision, whose steps of motion are recorded each
-        "collisions": scored_collisions(
-            PairDistances.of(record["position"][:: int(meta.get("decision_steps", 1))]), meta, side
-        ),
+        **columns,
+        **closest_m,
+        "closest_m": min((value for value in closest_m.values() if value is not None), default=None),
+        "clean_games": not any(columns[breach_column(kind, min(radii_m))] for kind in KINDS),
+        "collisions": scored_collisions(record, meta, side),
         **shield_columns(record, own, dt_s),
         "deadlocks": count_deadlocks(record["speed_mps"][1:], record["wanted"][..., 0], own, dt_s),
         **{one.column: one.measure(record, side) for one in game_metrics_of(radii_m) if one.measure is not None},
     }
 
 
-def scored_collisions(distances: PairDistances, meta: Mapping[str, Any], side: int) -> int:
-    """Count collisions as the game does: per entry into the sum of the agent radii, for each boat of the team.
-
-    Two teammates that collide thus count twice.
-    """
-    own_radius_m = np.broadcast_to(np.asarray(meta["agent_radius_m"], dtype=np.float64), len(meta["team"]))
-    total = 0
-    for kind, boats_in_it in (("teammate", 2), ("opponent", 1)):
-        pairs = distances.of_pairs(team_pairs(meta["team"], side, kind))
-        total += boats_in_it * count_breaches(pairs, own_radius_m[pairs.pairs].sum(axis=1))
+def scored_collisions(record: Record, meta: Mapping[str, Any], side: int) -> int:
+    """Count collisions as the game does: per entry into the sum of the agent radii, for each boat of the team in it."""
+    # it looks for them after every decision, whose steps of motion are recorded each
+    position, own = record["position"][:: int(meta.get("decision_steps", 1))], np.asarray(meta["team"]) == side
+    radius_m, total = np.broadcast_to(np.asarray(meta["agent_radius_m"], dtype=np.float64), len(own)), 0
+    for apart_m in np.unique(radius_m[:, None] + radius_m):
+        boats = find_breaches(position, apart_m)[:, 1:3].astype(np.int64)
+        total += int(own[boats[radius_m[boats].sum(axis=1) == apart_m]].sum())
     return total
 
 
@@ -240,46 +228,9 @@ def shield_columns(record: Record, own: NDArray[np.bool_], dt_s: float) -> dict[
     }
 
 
-def driven_breaches(
-    record: Record, driven: NDArray[np.bool_], side: int, radii_m: Sequence[float] = RADII_M
-) -> dict[str, int]:
-    """Count the breaches of a team in which the game drove (T, n) a boat of it: no policy's command could prevent them.
-
-    Returns:
-        Per radius ``breaches_driven_2.5m`` and so on, and of them those of two own boats,
-        ``breaches_driven_teammate_2.5m``, and with opponents, ``breaches_driven_opponent_2.5m``.
-    """
-    own = np.asarray(read_meta(record)["team"]) == side
-    found = {}
-    for radius_m in radii_m:
-        rows = find_breaches(record["position"], radius_m)[:, :3].astype(np.int64)
-        steps, boats = rows[:, 0] - 1, rows[:, 1:]
-        hit = (own[boats] & driven[steps[:, None], boats]).any(axis=1)
-        mates = own[boats].all(axis=1)
-        for name, kind in (("driven", hit), ("driven_teammate", hit & mates), ("driven_opponent", hit & ~mates)):
-            found[breach_column(name, radius_m)] = int(kind.sum())
-    return found
-
-
 def reason_counts(record: Record, side: int) -> dict[str, int]:
     """Count boat-steps per reason name, for the boats of one team that a shield decided for."""
     meta = read_meta(record)
     codes = record["reason"][:, np.asarray(meta["team"]) == side]
     names = meta["reason_names"]
     return {name: int((codes == code).sum()) for code, name in enumerate(names) if code != NOT_COVERED}
-
-
-def _breach_columns(
-    distances: PairDistances, meta: Mapping[str, Any], side: int, radii_m: Sequence[float]
-) -> dict[str, Any]:
-    columns: dict[str, Any] = {}
-    for kind in ("teammate", "opponent"):
-        pairs = distances.of_pairs(team_pairs(meta["team"], side, kind))
-        for radius_m in radii_m:
-            columns[breach_column(kind, radius_m)] = count_breaches(pairs, radius_m)
-        closest_m = pairs.closest_m()
-        columns[f"closest_{kind}_m"] = closest_m if np.isfinite(closest_m) else None
-    found = [columns[f"closest_{kind}_m"] for kind in ("teammate", "opponent")]
-    columns["closest_m"] = min((value for value in found if value is not None), default=None)
-    columns["clean_games"] = not any(columns[breach_column(kind, min(radii_m))] for kind in ("teammate", "opponent"))
-    return columns

@@ -188,7 +188,7 @@ def game_report(results: Mapping[str, Any]) -> Report:
         plots=_plots(pairings, games, separation_m) if games else (),
         notes=[NOTE],
         sections=[
-            Section("Pairings", [_pairing_table(pairing) for pairing in pairings]),
+            Section("Pairings", [*map(_pairing_table, pairings)], COVERED_WORDS if settings.get("covered") else ""),
             Section(
                 "Breaches judged in hindsight",
                 [*map(_verdict_table, pairings), *([_breaches_table(breaches)] if breaches else [])],
@@ -309,7 +309,7 @@ def _pairing_table(pairing: Summary) -> Table:
     meanings = {metric.key: metric.meaning for metric in game_metrics_of()}
     columns, covered = columns_of(pairing), pairing.get("games_covered")
     note = f"{pairing['games_off']} games without, {pairing['games_on']} with the shield; per game [95 % interval]"
-    note += f". {COVERED_WORDS} {covered} games covered" if covered else ""
+    note += f"; {covered} games covered" if covered else ""
     if total := sum(pairing["reasons"].values()):
         parts = [f"{name} {100 * count / total:.2f} %" for name, count in pairing["reasons"].items() if count]
         note += f". Decisions: {', '.join(parts)} of {total:,} boat-steps"

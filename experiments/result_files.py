@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -43,12 +44,19 @@ def make_folder_of(path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
 
 
+@contextmanager
+def writing(what: str, remedy: str = "choose another place") -> Iterator[None]:
+    """Say what could not be written, why, and what to do (ConfigError), where the system refuses it."""
+    try:
+        yield
+    except OSError as error:
+        raise ConfigError(f"cannot write {what} ({error.strerror or error}); {remedy}") from error
+
+
 def make_folder(folder: Path) -> None:
     """Make a folder that results go to; ConfigError where it cannot be made."""
-    try:
+    with writing(f"to {folder}", "choose another --out"):
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigError(f"cannot write to {folder} ({error.strerror}); choose another --out") from error
 
 
 def write_new(path: Path, option: str, text: str) -> None:
@@ -61,18 +69,19 @@ def write_new(path: Path, option: str, text: str) -> None:
 
 
 def lock_folder(folder: Path) -> BaseFileLock:
-    """Make a folder this process's own as long as what is returned lives; several users in one process share it.
+    """Make a folder, this process's own as long as what is returned lives; several users in one process share it.
 
     Raises:
-        ConfigError: another process writes there.
-        OSError: no file can be made there.
+        ConfigError: another process writes there, or no file can be made there.
     """
-    lock = FileLock(folder.resolve() / ".lock", timeout=0, is_singleton=True)
-    try:
-        lock.acquire()
-    except Timeout:
-        words = f"{folder} is being written to by another process; wait until it is done or choose another --out"
-        raise ConfigError(words) from None
+    make_folder(folder)
+    with writing(f"to {folder}", "choose another --out"):
+        lock = FileLock(folder.resolve() / ".lock", timeout=0, is_singleton=True)
+        try:
+            lock.acquire()
+        except Timeout:
+            words = f"{folder} is being written to by another process; wait until it is done or choose another --out"
+            raise ConfigError(words) from None
     return lock
 
 
@@ -111,12 +120,10 @@ def write_json(path: Path | None, content: Mapping[str, Any]) -> None:
         return
     text = json.dumps(finite(content), indent=2, default=plain_value, allow_nan=False)
     part = path.with_name(f".{path.name}.part")
-    try:
+    with writing(f"{path}"):
         make_folder_of(path)
         part.write_text(text + "\n", encoding="utf-8")
         os.replace(part, path)
-    except OSError as error:
-        raise ConfigError(f"cannot write {path} ({error.strerror}); choose another place") from error
 
 
 def table_name(stem: str = "rows") -> str:
@@ -130,10 +137,8 @@ def write_table(folder: Path, rows: Sequence[Mapping[str, Any]], stem: str = "ro
 
     path = folder / table_name(stem)
     table = pd.DataFrame(list(rows)).convert_dtypes()
-    try:
+    with writing(f"{path}"):
         (table.to_csv if path.suffix == ".csv" else table.to_parquet)(path, index=False)
-    except OSError as error:
-        raise ConfigError(f"cannot write {path} ({error.strerror or error}); choose another place") from error
     return path
 
 

@@ -39,7 +39,7 @@ from filelock import BaseFileLock
 from steerclear.shield.exceptions import ConfigError
 
 from .provenance import code_digest, machine, versions
-from .result_files import lock_folder, plain_value, told_settings, write_json, write_table
+from .result_files import lock_folder, plain_value, told_settings, write_json, write_table, writing
 from .workers import Job, Row, Workers, end_failed, outcomes
 
 EXPERIMENT_FILE, ROWS_FILE, RESULTS_FILE = "experiment.json", "rows.jsonl", "results.json"
@@ -198,7 +198,7 @@ def execute(
 
 def open_folder(folder: Path, command: str, resume: bool) -> BaseFileLock:
     """Make a folder this process's own; what refuses it (ConfigError, see `execute`) leaves it as it was."""
-    try:
+    with writing(f"to {folder}", "choose another --out"):
         folder.mkdir(parents=True, exist_ok=True)
         _check_folder(folder, command, resume)
         lock = lock_folder(folder)
@@ -208,8 +208,6 @@ def open_folder(folder: Path, command: str, resume: bool) -> BaseFileLock:
         if (content := rows.read_bytes()) and not content.endswith(b"\n"):  # cut by a crash: its job runs again
             with rows.open("ab") as file:
                 file.write(b"\n")
-    except OSError as error:
-        raise ConfigError(f"cannot write to {folder} ({error.strerror}); choose another --out") from error
     return lock
 
 
@@ -256,21 +254,19 @@ def append_row(path: Path, name: str, rows: Sequence[Row]) -> None:
     """
     entry = json.loads(json.dumps({"job": name, "code": code_digest(), "rows": list(rows)}, default=plain_value))
     left = memoryview((json.dumps({**entry, "sum": job_id(entry)}) + "\n").encode())
-    try:
-        with path.open("ab", buffering=0) as file:
-            begin = file.tell()
-            try:
-                while left:
-                    left = left[file.write(left) :]
-                os.fsync(file.fileno())
-            except OSError:
-                with contextlib.suppress(OSError):
-                    os.ftruncate(file.fileno(), begin)
-                raise
-    except OSError as error:
-        raise ConfigError(
-            f"cannot write {path} ({error.strerror}); what it holds is kept: make room, then --resume"
-        ) from error
+    with (
+        writing(f"{path}", "what it holds is kept: make room, then --resume"),
+        path.open("ab", buffering=0) as file,
+    ):
+        begin = file.tell()
+        try:
+            while left:
+                left = left[file.write(left) :]
+            os.fsync(file.fileno())
+        except OSError:
+            with contextlib.suppress(OSError):
+                os.ftruncate(file.fileno(), begin)
+            raise
 
 
 def read_rows(path: Path) -> dict[str, list[Row]]:

@@ -11,7 +11,7 @@ from rich.console import Group
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from .metrics import breach_column
+from .metrics import game_metrics_of
 from .verdicts import SHORT_HEADS, verdict_rows
 
 Figure = Mapping[str, float | None]
@@ -30,26 +30,6 @@ COVERED_WORDS = (
 _COVERED_SHOWN = ("captures", "net_captures", "clean_games", "changed_share")
 """Figures of the small table of covered games, beside hits; report and results have all."""
 _VERDICTS = {True: Text("met", "green"), False: Text("not met", "red"), None: Text("no data", "yellow")}
-_GAME = {
-    "captures": "captures",
-    "captures_against": "captures against",
-    "grabs": "grabs",
-    "tags": "tags",
-    "tags_against": "times tagged",
-    "hits": "",
-    "closest_m": "closest, m",
-    "changed_share": "share of steps changed",
-    "mean_heading_change_deg": "mean change, deg",
-    "mean_speed_change_mps": "mean change, m/s",
-    "decision_p50_us": "decision p50, us",
-    "decision_p99_us": "decision p99, us",
-    "collisions": "collisions scored",
-    "primary": "primary score",
-    "secondary": "secondary score",
-    "policy_failures": "policy failures",
-    "opponent_policy_failures": "opponent's policy failures",
-}
-"""Lines of the table of a single game, by column; hits stand for those at every radius."""
 
 
 @dataclass(frozen=True)
@@ -100,11 +80,7 @@ def verdict_table(summary: Mapping[str, Any]) -> Group | None:
 
 
 def titled(
-    title: str,
-    heads: Sequence[str],
-    rows: Sequence[Sequence[str | Text]],
-    width: int | None = None,
-    wrap: bool = False,
+    title: str, heads: Sequence[str], rows: Sequence[Sequence[str | Text]], width: int | None = None, wrap: bool = False
 ) -> Group:
     """Lay out a table for the terminal under its title.
 
@@ -182,7 +158,11 @@ def game_table(row: Mapping[str, Any], radii_m: Sequence[float]) -> Group:
     """A single game: its row, and the radii at which breaches were counted, m."""
     state = "shielded" if row["shielded"] else "not shielded"
     title = f"{row['pairing']}, {row['side']} {state}, {row['duration_s']:g} s"
-    hits = {breach_column(kind, r): f"hits {kind} {r:g} m" for kind in ("teammate", "opponent") for r in radii_m}
-    named = [pair for key, words in _GAME.items() for pair in (hits.items() if key == "hits" else [(key, words)])]
-    shown = [(words, row.get(name)) for name, words in named]
-    return titled(title, ["", ""], [[words, number_text(value)] for words, value in shown if value is not None])
+    shown: dict[str, Any] = {}
+    for metric in game_metrics_of(radii_m):
+        if metric.kind == "percent":
+            shown[metric.label] = 100.0 * row[metric.column] / row[metric.per] if row[metric.per] else None
+        elif metric.kind in ("count", "mean"):
+            shown[metric.label.replace(" mean m", " m")] = row.get(metric.column)
+    shown |= {"policy failures": row["policy_failures"], "opponent's": row["opponent_policy_failures"]}
+    return titled(title, ["", ""], [[words, number_text(value)] for words, value in shown.items() if value is not None])

@@ -18,7 +18,7 @@ from steerclear.shield.jit import Array
 from steerclear.shield.platforms import layout as L
 
 from ..entries.team import make_team
-from ..game_metrics import driven_breaches, reason_counts, scores, tally
+from ..game_metrics import reason_counts, scores, tally
 from ..verdicts import StateLog, judge_game, verdict_columns
 from ..workers import Workers, outcomes
 from .openings import opening
@@ -183,8 +183,7 @@ class Match:
             for name in ("captures", "grabs", "tags")
             for suffix, team in (("", own), ("_against", 1 - own))
         }
-        counts |= tally(record, own, spec.radii_m)
-        counts |= driven_breaches(record, np.array(self._driven), own, spec.radii_m)
+        counts |= tally(record, own, spec.radii_m, np.array(self._driven))
         timed = self._decision_us[1:]  # the first one loads compiled code
         quantiles = np.quantile(timed, [0.5, 0.99, 1.0]).tolist() if timed else [None] * 3
         failed = [self.teams[team].failures() for team in (own, 1 - own)]

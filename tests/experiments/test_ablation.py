@@ -58,15 +58,6 @@ def test_every_pairing_is_played_off_and_on_from_the_same_seeds():
     assert [MatchSpec.of_job(json.loads(json.dumps(spec.as_job()))) for spec in specs] == specs
 
 
-def test_a_game_of_a_policy_whose_file_changed_is_another_game(tmp_path):
-    entry = tmp_path / "entry.py"
-    entry.write_text("SPEED = 1")
-    settings = AblationSettings(own=str(entry), opponents=("easy",), games=1)
-    before = [spec.key for spec in settings.specs()]
-    entry.write_text("SPEED = 2")
-    assert not set(before) & {spec.key for spec in settings.specs()}
-
-
 def test_games_come_back_in_order_with_documented_columns(played):
     assert not played.failed
     assert [(row["game"], row["opponent"], row["shielded"]) for row in played.rows] == [

@@ -7,12 +7,9 @@ from steerclear.experiments.bench import BenchSettings, bench_goals, bench_table
 from steerclear.experiments.bench_measures import (
     BatchSize,
     decide_times,
-    memory_mib,
     programs_of,
-    quantiles_us,
     questions_of_games,
     solver_times,
-    time_calls,
 )
 from steerclear.experiments.docs import write_pages
 from steerclear.experiments.docs_keys import KEYS, undocumented
@@ -102,18 +99,6 @@ def test_solvers_are_held_against_each_other_on_the_same_programs():
     assert times["daqp"]["ratio"] == 1.0
     assert times["daqp"]["solved"] == times["osqp"]["solved"] == times["compiled projection"]["solved"] == 0.5
     assert max(row["differs"] for row in times.values() if row["differs"] is not None) < 1e-3
-
-
-def test_timing_helpers():
-    calls = []
-    assert len(time_calls(calls.append, 7)) == 7
-    assert calls == list(range(7))
-    disturbed = np.arange(1001.0)
-    disturbed[500] = 1e6
-    figures = quantiles_us([np.arange(1001.0), disturbed, np.arange(1001.0)])
-    assert figures == {"p50_us": 500.0, "p99_us": 990.0, "p99_9_us": pytest.approx(999.0)}
-    assert quantiles_us([np.zeros(0)]) == {"p50_us": None, "p99_us": None, "p99_9_us": None}
-    assert memory_mib(lambda: np.zeros(2**20)) == pytest.approx(8.0, rel=0.01)
 
 
 def test_the_page_of_keys_holds_every_key(tmp_path):

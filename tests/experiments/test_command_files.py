@@ -82,8 +82,7 @@ def test_one_option_names_a_file_once(words, named, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "words",
-    ["ablate", "evaluate medium", "tournament", "encounters", "attack", "reach play --own heron --other heron"],
+    "words", ["ablate", "evaluate medium", "tournament", "encounters", "attack", "reach play --own heron --other heron"]
 )
 @pytest.mark.parametrize("more", ["", " --resume"])
 def test_no_json_is_written_where_the_command_keeps_its_own_results(words, more, tmp_path, monkeypatch):
@@ -119,19 +118,6 @@ def test_a_new_platform_has_a_plain_name_and_lies_where_it_was_begun(name, tmp_p
     assert done.exit_code == ExitCode.BAD_INPUT
     assert "give 1 to 32 letters, digits" in done.stderr
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
-
-
-@pytest.mark.parametrize("option", ["--out there.npz", "--out new.npz --submission there.zip"])
-def test_an_export_writes_over_no_file(option, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    for name in ("there.npz", "there.zip"):
-        Path(name).write_text("mine")
-    done = CliRunner().invoke(app, ["export", str(FILES["jin"]), *option.split()], terminal_width=200)
-    assert done.exit_code == ExitCode.BAD_INPUT
-    name, place = option.split()[::-1][:2]
-    assert f"{name} is there already; name another {place}" in done.stderr
-    assert [path.name for path in sorted(tmp_path.iterdir())] == ["there.npz", "there.zip"]
-    assert {path.read_text() for path in tmp_path.iterdir()} == {"mine"}
 
 
 READ = {
@@ -175,31 +161,48 @@ def test_every_file_that_a_command_writes_must_be_new():
     assert {"fit file", "reach solve out_file", "render to", "play save", "ablate json_file"} <= marked
 
 
-@pytest.mark.parametrize(
-    ("words", "name", "option"),
-    [
-        ("fit none.csv --out mine.yaml", "mine.yaml", "--out"),
-        ("fit none.csv", "boat.yaml", "--out"),
-        ("fit none.csv --out new.yaml", "new.png", "--plot"),
-        ("fit none.csv --plot mine.svg", "mine.svg", "--plot"),
-        ("render none.npz --to mine.html", "mine.html", "--to"),
-        ("play --save new.npz --save mine.npz", "mine.npz", "--save"),
-        ("reach solve --own heron --other heron --out mine.npz", "mine.npz", "--out"),
-        ("reach show --own heron --other heron --picture mine.png", "mine.png", "--picture"),
-        ("sim-boats --demo --record mine.npz", "mine.npz", "--record"),
-        ("demonstrate --out mine.parquet", "mine.parquet", "--out"),
-        ("platform new mine", "mine.yaml", "--out"),
-        ("ablate --json mine.json", "mine.json", "--json"),
-        ("entry check none.zip --json mine.json", "mine.json", "--json"),
-    ],
-)
-def test_no_command_writes_over_a_file(words, name, option, tmp_path, monkeypatch):
+THERE = "is there already; name another {}, or remove it"
+RESULTS = "would be written over; choose another --out, or move it"
+TAKEN = [
+    ("fit none.csv --out mine.yaml", "mine.yaml", THERE.format("--out")),
+    ("fit none.csv", "boat.yaml", THERE.format("--out")),
+    ("fit none.csv --out new.yaml", "new.png", THERE.format("--plot")),
+    ("fit none.csv --plot mine.svg", "mine.svg", THERE.format("--plot")),
+    ("render none.npz --to mine.html", "mine.html", THERE.format("--to")),
+    ("play --save new.npz --save mine.npz", "mine.npz", THERE.format("--save")),
+    ("reach solve --own heron --other heron --out mine.npz", "mine.npz", THERE.format("--out")),
+    ("reach show --own heron --other heron --picture mine.png", "mine.png", THERE.format("--picture")),
+    ("sim-boats --demo --record mine.npz", "mine.npz", THERE.format("--record")),
+    ("demonstrate --out mine.parquet", "mine.parquet", THERE.format("--out")),
+    ("platform new mine", "mine.yaml", THERE.format("--out")),
+    ("ablate --json mine.json", "mine.json", THERE.format("--json")),
+    ("entry check none.zip --json mine.json", "mine.json", THERE.format("--json")),
+    (f"export {FILES['jin']} --out mine.npz", "mine.npz", THERE.format("--out")),
+    (f"export {FILES['jin']} --out new.npz --submission mine.zip", "mine.zip", THERE.format("--submission")),
+    ("encounters --scene none.json --out .", "replay.html", THERE.format("--out")),
+    ("attack --replay none.json --out .", "replay.html", THERE.format("--out")),
+    ("train a.yaml --out .", "config.yaml", "would be written over; name another --out, or move it"),
+    ("train a.yaml --out .", "best.npz", "would be written over; name another --out, or move it"),
+    ("docs --out .", "json_keys.md", "was not made by steerclear docs; choose another --out, or move it"),
+    *(
+        (f"{command} --out .", name, RESULTS)
+        for command in ("ablate --quick", "evaluate medium --quick", "encounters", "attack", "tournament")
+        for name in ("report.html", "rows.csv")
+    ),
+]
+"""Command lines, a file of that name there, and what is said of it."""
+
+
+@pytest.mark.parametrize(("words", "name", "said"), TAKEN)
+def test_no_command_writes_over_a_file(words, name, said, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    Path("a.yaml").write_text("algorithm: cloning\n")
     Path(name).write_text("mine")
     done = CliRunner().invoke(app, words.split(), terminal_width=200)
     assert done.exit_code == ExitCode.BAD_INPUT
-    assert f"error: {name} is there already; name another {option}, or remove it" in done.stderr
-    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {name: "mine"}
+    assert f"{name} {said}" in done.stderr
+    assert {path.name for path in tmp_path.iterdir()} == {"a.yaml", name}
+    assert Path(name).read_text() == "mine"
 
 
 @pytest.mark.parametrize(
@@ -248,18 +251,6 @@ def test_a_run_that_is_gone_on_with_writes_its_json_again(tmp_path):
         check_files(ablate, {**given, "resume": False})
 
 
-@pytest.mark.parametrize("command", ["ablate --quick", "evaluate medium --quick", "encounters", "attack", "tournament"])
-@pytest.mark.parametrize("name", ["report.html", "rows.csv"])
-def test_results_write_over_nothing(command, name, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    Path("out").mkdir()
-    Path("out", name).write_text("mine")
-    done = CliRunner().invoke(app, [*command.split(), "--out", "out"], terminal_width=200)
-    assert done.exit_code == ExitCode.BAD_INPUT
-    assert f"{name} would be written over; choose another --out, or move it" in done.stderr
-    assert {path.name: path.read_text() for path in Path("out").iterdir()} == {name: "mine"}
-
-
 @pytest.mark.parametrize(
     "line", ["ablate", "evaluate medium", "encounters", "attack", "tournament", "entry report a.zip --opponents hold"]
 )
@@ -274,35 +265,7 @@ def test_a_run_to_go_on_with_is_named(line, tmp_path, monkeypatch):
     assert not Path("results").exists()
 
 
-@pytest.mark.parametrize("words", ["encounters --scene none.json", "attack --replay none.json"])
-def test_scenes_write_over_no_replay(words, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    Path("replay.html").write_text("mine")
-    done = CliRunner().invoke(app, [*words.split(), "--out", "."], terminal_width=200)
-    assert done.exit_code == ExitCode.BAD_INPUT
-    assert "replay.html is there already; name another --out, or remove it" in done.stderr
-    assert Path("replay.html").read_text() == "mine"
-
-
-@pytest.mark.parametrize("name", ["config.yaml", "best.npz"])
-def test_a_training_writes_over_nothing(name, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    Path("a.yaml").write_text("algorithm: cloning\n")
-    Path("out").mkdir()
-    Path("out", name).write_text("mine")
-    done = CliRunner().invoke(app, ["train", "a.yaml", "--out", "out"], terminal_width=200)
-    assert done.exit_code == ExitCode.BAD_INPUT
-    assert f"{name} would be written over; name another --out, or move it" in done.stderr
-    assert Path("out", name).read_text() == "mine"
-
-
-def test_docs_makes_its_own_pages_anew_and_no_others(tmp_path):
-    (tmp_path / "json_keys.md").write_text("# Our keys\n")
-    done = CliRunner().invoke(app, ["docs", "--out", str(tmp_path)], terminal_width=200)
-    assert done.exit_code == ExitCode.BAD_INPUT
-    assert "json_keys.md was not made by steerclear docs; choose another --out, or move it" in done.stderr
-    assert [path.name for path in tmp_path.iterdir()] == ["json_keys.md"]
-    (tmp_path / "json_keys.md").unlink()
+def test_docs_makes_its_own_pages_anew(tmp_path):
     for _ in range(2):
         assert CliRunner().invoke(app, ["docs", "--out", str(tmp_path)]).exit_code == 0
     assert [path.name for path in tmp_path.iterdir()] == ["json_keys.md"]

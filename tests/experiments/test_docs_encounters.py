@@ -92,25 +92,6 @@ def test_only_families_that_all_met_count():
     assert one_contest(both(), fewer).families == ()
 
 
-def test_other_scenes_are_another_section():
-    titles = [
-        contest.title
-        for contest in contests_of(
-            each
-            for one in (both(), content(cell("a", "head_on"), seed=8), content(cell("a", "head_on"), delay_s=0.3))
-            for each in cells_of(one)
-        )
-    ]
-    assert titles == ["heron meets heron, 2.5 m"] * 2 + ["heron meets heron, 2.5 m, 0.3 s delay"]
-
-
-def test_conditions_and_figures_may_stand_in_their_own_mappings():
-    flat = cell("a", "head_on")
-    figures = {key: flat.pop(key) for key in list(flat) if key not in ("guard", "family", "own", "other")}
-    nested = {**flat, "summary": figures, "conditions": {"radius_m": 4.0}}
-    assert one_contest(content(nested)).title == "heron meets heron, 4 m"
-
-
 def test_the_page_shows_what_the_results_say(tmp_path):
     page, picture = (
         path for path in write_pages([both()], tmp_path) if path.name in ("comparison.md", "comparison.png")

@@ -9,7 +9,6 @@ from importlib.resources import files
 import numpy as np
 import pytest
 from steerclear.env.record import make_record, read_meta
-from steerclear.experiments.page import as_json
 from steerclear.experiments.replay_html import SCRIPTS, pack, write_replay
 from steerclear.shield.exceptions import ConfigError, TraceError
 
@@ -95,13 +94,6 @@ def test_the_page_holds_the_record(game_record, tmp_path, compress):
     np.testing.assert_allclose(game["breaches"], record["breaches"], atol=1e-3)
     assert game["meta"]["reason_names"] == read_meta(record)["reason_names"]
     assert game["meta"]["obstacles"]["circle"] == [[3.0, [40.0, 8.0]]]
-
-
-def test_an_unchanged_command_has_equal_codes(game_record):
-    values = decode(pack(game_record, "a game"))
-    passed = ~game_record["intervened"].T
-    np.testing.assert_array_equal(values["sent_speed"][passed], values["wanted_speed"][passed])
-    np.testing.assert_array_equal(values["sent_heading"][passed], values["wanted_heading"][passed])
 
 
 def test_the_page_is_whole_and_loads_nothing(game_record, tmp_path):
@@ -195,13 +187,6 @@ def test_bad_input_is_one_clear_error(game_record, tmp_path):
     with pytest.raises(ConfigError, match="Choose a folder you may write to"):
         write_replay(game_record, tmp_path / "file" / "a.html")
     assert [file.name for file in tmp_path.iterdir()] == ["file"]
-
-
-def test_quoting():
-    assert json.loads(as_json({"a": "</x>\u2028"})) == {"a": "</x>\u2028"}
-    assert "<" not in as_json("</script>")
-    with pytest.raises(ValueError, match="JSON"):
-        as_json(float("nan"))
 
 
 READER = """

@@ -121,16 +121,6 @@ def test_the_report_says_what_a_reason_means_beside_its_plot(reason, results, tm
     assert REASONS[reason.lower()] in plot[: plot.index("</figure>")]
 
 
-def test_only_shielded_games_are_a_report_too(results, tmp_path):
-    for entry in results["pairings"]:
-        entry["games_off"] = 0
-        for figures in entry["metrics"].values():
-            figures.pop("off", None)
-    text = write_report(results, tmp_path / "report.html").read_text()
-    assert painted(plots_in(text)[0], "off") == 0
-    assert 'class="arrow"' not in text
-
-
 def test_plots_without_data_and_with_long_labels_are_still_plots():
     figures = [plots.bars([], "m"), plots.dots([("a", [])], "m"), plots.shares([], "%")]
     figures += [plots.bars([("a", [("on", {"value": None})])], "m"), plots.scatter([("<", [])], ("$x$", "y_{z}"))]

@@ -65,14 +65,6 @@ def test_bootstrap_is_seeded_and_leaves_out_nan():
     assert mean_interval(values).value == pytest.approx(4.0)
 
 
-def test_one_value_has_a_mean_but_no_limits_and_none_has_neither():
-    one = mean_interval([2.0])
-    assert one.value == 2.0
-    assert math.isnan(one.low)
-    assert math.isnan(one.high)
-    assert math.isnan(mean_interval([]).value)
-
-
 def test_pairing_removes_what_the_seeds_share():
     random = np.random.default_rng(0)
     off = random.normal(0.0, 100.0, 30)

@@ -40,11 +40,7 @@ def test_a_delay_is_whole_steps_rounded_up(delay_s, steps):
 
 
 def test_what_a_shield_is_told():
-    assert ROUGH.shield_settings(0.1) == {
-        "delay_s": pytest.approx(0.3),
-        "position_error_m": 0.5,
-        "current_mps": 0.3,
-    }
+    assert ROUGH.shield_settings(0.1) == {"delay_s": pytest.approx(0.3), "position_error_m": 0.5, "current_mps": 0.3}
     assert CALM.shield_settings(0.1) == {}
 
 

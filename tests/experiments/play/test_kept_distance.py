@@ -27,12 +27,7 @@ def test_it_is_the_games_unless_one_is_given_or_the_usual_is_larger(preset, rule
 
 @pytest.mark.parametrize(
     "words",
-    [
-        ("ablate",),
-        ("evaluate", "easy", "--shield"),
-        ("play", "--shield"),
-        ("tournament", "--teams", "easy,medium"),
-    ],
+    [("ablate",), ("evaluate", "easy", "--shield"), ("play", "--shield"), ("tournament", "--teams", "easy,medium")],
 )
 def test_a_distance_that_the_field_has_no_room_for_is_refused(words, tmp_path):
     asked = ("--separation", "41", "--preset", "aamas2024")
