@@ -61,6 +61,8 @@ def check(
     found = check_entry(entry, preset, max_time, answer_time)
     say(*check_lines(found))
     write_json(json_file, {"command": "entry check", "versions": versions(), "machine": machine(), **found})
+    if found["made_for"] is None and not found["failures"]:
+        say(f"next: steerclear entry wrap {entry} --out shielded.zip")
     finish(not found["failures"] and not always_late(found))
 
 
@@ -70,7 +72,7 @@ def check_lines(found: dict[str, Any]) -> list[str]:
     missing = f"; not installed here: {', '.join(imports['missing'])}" if imports["missing"] else ""
     lines = [
         f"{headline(found)}.",
-        f"imports beyond Python's own: {', '.join(imports['needed']) or 'nothing'}{missing}",
+        f"imports beyond Python's own: {', '.join(imports['needed']) or 'nothing'}{missing}{_stands_in(found)}",
         f"time of a decision of the team: mean {time_text(found['mean_decision_ms'])}, longest "
         f"{time_text(found['max_decision_ms'])} in {found['decisions']} decisions ({found['calls']} actions); "
         f"{found['late_decisions']} took longer than the game gives ({found['decision_ms']:g} ms)",
@@ -85,6 +87,11 @@ def check_lines(found: dict[str, Any]) -> list[str]:
         boats = ", ".join(f"{boat} x {count}" for boat, count in one["boats"].items())
         lines.append(f"failed: {one['kind']} ({boats}): {one['message']}")
     return lines
+
+
+def _stands_in(found: dict[str, Any]) -> str:
+    """What a zip that steerclear made does without."""
+    return "; of these numba is only used where it is there" if found["made_for"] is not None else ""
 
 
 def _kept(shield: dict[str, Any] | None) -> str:

@@ -342,7 +342,7 @@ def show(results: dict[str, Any], folder: Path) -> None:
     if results["quick"]:
         out().print(
             f"This was the small version: {settings['games']} games of {settings['rules']['max_time_s']:g} s per "
-            "pairing and state. Its intervals are wide; leave out --quick for 20 games of full length."
+            "pairing and state. Its intervals are wide; leave out --quick for games of full length, 20 and more."
         )
     elif settings["games"] < FEW_GAMES:
         out().print(

@@ -137,7 +137,7 @@ class Shield:
             fleet.check()
             twin._deciders_of(fleet, twin._static(OPEN_WATER))
 
-    def decide(self, fleet: Fleet, wanted: Commands, surroundings: Surroundings | None = None) -> Decisions:
+    def decide(self, fleet: Fleet, nominal: Commands, surroundings: Surroundings | None = None) -> Decisions:
         """Decide for all controlled boats of a fleet.
 
         Manoeuvres are found one boat at a time, in the order of names: the same boats get the same commands, bit for
@@ -145,7 +145,7 @@ class Shield:
 
         Args:
             fleet: all boats seen now.
-            wanted: nominal command of each boat, n rows; rows of boats not controlled are passed through. Speeds beyond
+            nominal: what each boat is to do, n rows; rows of boats not controlled are passed through. Speeds beyond
                 what a boat's platform does are cut first (not those of `Commands.game_deg`).
             surroundings: static constraints now, when they differ from the ones given at construction.
 
@@ -159,12 +159,12 @@ class Shield:
         """
         started = time.perf_counter()
         around = self.surroundings if surroundings is None else surroundings
-        _check(fleet, wanted, self.config)
+        _check(fleet, nominal, self.config)
         static = self._static(around)
         deciders = self._deciders_of(fleet, static)
         order, place = order_of(fleet.names)
         params, pending = deciders.scene.boats.params, deciders.scene.pending
-        within, cut = wanted.within(fleet.names, fleet.controlled, params[place, L.MAX_SPEED])
+        within, cut = nominal.within(fleet.names, fleet.controlled, params[place, L.MAX_SPEED])
         state, unknown = self._with_memory(fleet, order)
         works = pending[0, 0].copy() if pending.size > 0 else None
         self._give(deciders.scene.given, fleet, state[place], within, order)
@@ -183,7 +183,7 @@ class Shield:
         active = told[:, W.ACTIVE].astype(np.int64)
         return Decisions(
             fleet=fleet,
-            nominal=wanted,
+            nominal=nominal,
             filtered=commands,
             intervened=changed,
             reason=reason,

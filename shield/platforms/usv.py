@@ -195,8 +195,8 @@ def fresh_state(x_m: float, y_m: float, heading_deg: float, speed_mps: float = 0
     """State row of a boat whose autopilot has not run yet.
 
     Its thrust is 0, also of a boat that moves: such a one coasts, and can hardly turn for seconds. For a boat that has
-    been holding its speed set ``row[L.THRUST] = thrust_at(params, speed_mps)``, which is what the shield takes boats to
-    have whose thrust it is not told (`Fleet.of`).
+    been holding its speed set ``row[L.THRUST]`` to `shield.tracks.thrust_at` (params, speed m/s), which is what the
+    shield takes boats to have whose thrust it is not told (`Fleet.of`).
 
     Returns:
         Array of shape ``(N_STATE,)``, float64.
