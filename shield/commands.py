@@ -119,8 +119,10 @@ class Commands:
         if self.of_game or len(self) == 0:
             return self, None
         speed = self.values[:, 0]
-        beyond = (speed > highest_mps + ROUNDING_MPS) | (speed < -ROUNDING_MPS)
-        cut: BoolArray = controlled & beyond & (np.abs(self.values) <= LARGEST_COMMAND).all(axis=1)
+        cut: BoolArray = controlled & ((speed > highest_mps + ROUNDING_MPS) | (speed < -ROUNDING_MPS))
+        if not cut.any():
+            return self, None
+        cut &= (np.abs(self.values) <= LARGEST_COMMAND).all(axis=1)
         if not cut.any():
             return self, None
         first = int(np.argmax(cut))

@@ -85,9 +85,10 @@ def accepts_old_names(keywords: Mapping[str, str], attributes: Mapping[str, str]
     def renaming(build: Callable[..., Any]) -> Callable[..., Any]:
         @functools.wraps(build)
         def called(*args: Any, **given: Any) -> Any:
-            for old in [name for name in given if name in keywords]:
-                warn(old, keywords[old])
-                given[keywords[old]] = given.pop(old)
+            if not keywords.keys().isdisjoint(given):  # hardly ever, and decisions are made by the thousand
+                for old in [name for name in given if name in keywords]:
+                    warn(old, keywords[old])
+                    given[keywords[old]] = given.pop(old)
             return build(*args, **given)
 
         return called

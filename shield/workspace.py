@@ -6,6 +6,7 @@ Row n of arrays of n + 1 rows is a manoeuvre on trial.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -241,6 +242,14 @@ MOST_ROWS = 3000
 _KINDS: dict[Any, type] = {Array: np.float64, IntArray: np.int64, BoolArray: np.bool_}
 
 
+@cache
+def _arrays_of_a_scene() -> list[tuple[str, Any, tuple[int | str, ...]]]:
+    """Name, kind and shape of the fields of a scene that are allocated anew."""
+    hints = get_type_hints(Scene, include_extras=True).items()
+    found = [(name, get_args(hint)) for name, hint in hints if get_origin(hint) is Annotated]
+    return [(name, kind, tuple(shape)) for name, (kind, *shape) in found]
+
+
 def new_scene(decisions: int, boats: Boats, static: Static, tuning: Tuning, delay: int) -> Scene:
     """A scene in which nothing is to be decided about yet.
 
@@ -263,10 +272,8 @@ def new_scene(decisions: int, boats: Boats, static: Static, tuning: Tuning, dela
         "rows": min(n * (n + 6) + 2, MOST_ROWS),
     }
     fields: dict[str, Any] = {"boats": boats, "static": static, "tuning": tuning}
-    for name, hint in get_type_hints(Scene, include_extras=True).items():
-        if get_origin(hint) is Annotated:
-            kind, *shape = get_args(hint)
-            fields[name] = np.zeros([sizes[size] if isinstance(size, str) else size for size in shape], _KINDS[kind])
+    for name, kind, shape in _arrays_of_a_scene():
+        fields[name] = np.zeros([sizes[size] if isinstance(size, str) else size for size in shape], _KINDS[kind])
     fields["memories"], fields["pending"][:] = new_memory(decisions, n), np.nan
     return share(Scene(**fields))
 
@@ -274,9 +281,8 @@ def new_scene(decisions: int, boats: Boats, static: Static, tuning: Tuning, dela
 def part_of(scene: Scene, static: Static, first: int, last: int, delay: int) -> Scene:
     """Decisions ``first`` to ``last`` - 1 of a scene, the very arrays, with scratch of their own for another thread."""
     part = new_scene(last - first, scene.boats, static, scene.tuning, delay)
-    hints = get_type_hints(Scene, include_extras=True)
-    of_all = [name for name, hint in hints.items() if "B" in get_args(hint)]
-    return share(part._replace(**{name: getattr(scene, name)[first:last] for name in of_all}))
+    of_all = {name: getattr(scene, name)[first:last] for name, _, shape in _arrays_of_a_scene() if shape[0] == "B"}
+    return share(part._replace(**of_all))
 
 
 def new_memory(decisions: int, boats: int) -> Array:

@@ -16,12 +16,14 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
+import numpy as np
 from steerclear.shield import Shield
 from steerclear.shield.bridge.blackbox.disk import explain
 from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.exceptions import BridgeError
 from steerclear.shield.platforms import fresh_state, step_boat
+from steerclear.shield.tracks import run_on_commands, thrust_at
 
 from ..terminal import SafeFormatter
 from .orders import boats_of
@@ -45,7 +47,10 @@ def warm_up(fleet: FleetFile) -> None:
     """
     Shield(fleet.shield_config).warm_up(boats_of(fleet))
     for platform in set(fleet.platform_of.values()):
-        step_boat(platform.pack(), fresh_state(0.0, 0.0, 0.0), 1.0, 0.0, fleet.dt_s)
+        params, row = platform.pack(), fresh_state(0.0, 0.0, 0.0)
+        step_boat(params, row, 1.0, 0.0, fleet.dt_s)
+        thrust_at(params, 1.0)
+        run_on_commands(row[None].copy(), np.ones(1, np.bool_), params[None].copy(), np.zeros((1, 1, 2)), fleet.dt_s)
 
 
 @contextlib.contextmanager

@@ -240,7 +240,7 @@ def preflight(
 ) -> Outcome:
     """Run all checks, and the drill, which moves boats, when they allow it; boats are left stopped.
 
-    What was found is kept. The orders' policy is not needed.
+    What was found by a drill is kept. The orders' policy is not needed.
 
     Raises:
         FleetFileError: the file cannot be used; nothing was opened.
@@ -250,7 +250,9 @@ def preflight(
     warm_up(run.fleet)
     outcome = run_boats(run, "drill", _drill if drill else None, elsewhere=(*DRILLED, "drill"))
     outcome.ended = run.operator.ended
-    outcome.log = keep(run.fleet, run.text, orders.boat, outcome.checks, [result.name for result in outcome.refused])
+    if drill:  # else an earlier drill stays in force
+        refused = [result.name for result in outcome.refused]
+        outcome.log = keep(run.fleet, run.text, orders.boat, outcome.checks, refused)
     return outcome
 
 

@@ -92,7 +92,7 @@ def sets_goals(pairs: Sequence[SetPair], looked_up: bool = False) -> list[dict[s
 def sets_content(
     settings: Mapping[str, Any], pairs: Sequence[SetPair], looked_up: bool, started_s: float
 ) -> dict[str, Any]:
-    """The comparison as JSON; `docs_keys.SETS` describes it."""
+    """The comparison as JSON; `docs_keys.KEYS` describes it."""
     goals, head = sets_goals(pairs, looked_up), head_of("reach-compare", settings, started_s)
     rows = [asdict(pair) for pair in pairs]
     return {**head, "looked_up": looked_up, "pairs": rows, "goals": goals, "deprecated": {"bars": goals}}

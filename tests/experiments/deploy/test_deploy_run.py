@@ -291,9 +291,12 @@ def test_a_kept_preflight_of_a_wrong_form_counts_as_missing(fleet_file, content)
 def test_every_key_of_the_json_is_documented(fleet_file, boats, tmp_path):
     path = tmp_path / "out.json"
     options = [*(f"--accept={name}" for name in (*BUSY, "drill", "known")), "--speed", f"{SPEED:g}", "--wait", "90"]
+    drilled, fleet = [good("course"), good("response"), good("model")], load_fleet(fleet_file)
+    keep(fleet, fleet_file.read_text(), None, drilled, [])
     result = CliRunner().invoke(app, ["preflight", str(fleet_file), "--no-drill", "--json", str(path), *options])
     assert result.exit_code == 0, result.output
     content = json.loads(path.read_text())
+    assert check_drill(fleet, fleet_file.read_text(), None, ["blue_1"]).passed, "checks alone leave it in force"
     assert {"disk", "geofence", "rates:blue_1"} <= {check["name"] for check in content["checks"]}
     assert undocumented(content, KEYS["preflight"]) == []
     figures = {**Timing().figures(), **Tally().figures(), "missed_turns": 0.0}
