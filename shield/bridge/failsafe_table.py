@@ -106,7 +106,7 @@ CONDITIONS = {
         ),
         Condition(
             "obstacle",
-            "No command would keep a boat off a shore or an obstacle but to stop.",
+            "No command would keep a boat off a shore or an obstacle but to stop, with geofence then: stop.",
             "the shield's decision",
             _LINKS_STOP,
             returns="by itself, with a command that stays clear",
