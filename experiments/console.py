@@ -124,7 +124,7 @@ class OnceCommand(TyperCommand):
         Raises:
             UsageError: an option is given twice.
         """
-        if self._rare and "--help-all" in args:
+        if "--help-all" in args:
             ctx.meta[ALL] = True
             args = ["--help"]
         _, _, given = self.make_parser(ctx).parse_args(args=list(args))

@@ -16,7 +16,7 @@ def test_the_page_shows_each_step_and_all_of_them_exist():
     assert named == ["platform"] * 3 + ["sea-trial", "fit", "platform", "preflight", "deploy", "replay"]
     for words in commands() + commands("sim"):
         command = words[1 : 3 if words[1] == "platform" else 2]
-        result = CliRunner().invoke(app, [*command, "--help"])
+        result = CliRunner().invoke(app, [*command, "--help-all"])
         assert result.exit_code == 0, words
         options = [word for word in words if word.startswith("--")]
         assert all(option in result.output for option in options), words

@@ -118,7 +118,7 @@ def test_a_fleet_that_does_not_fit_is_refused(name):
         ("shield:straight_horizn_s=3", "did you mean 'straight_horizon_s'"),
         ("parabolic:a=1", "takes no settings; only shield, reach, gatekeeper"),
         ("reach:straight_horizon_s=3", "has no setting 'straight_horizon_s'"),
-        ("reach:buffer_m=-1", "must be >= 0"),
+        ("reach:buffer_m=-1", "buffer_m is -1; give 0 to 50 m"),
         ("gatekeeper:horizon=3", "no setting 'horizon'; it knows horizon_s, switch_s"),
         ("gatekeeper:horizon_s=0", "at least 0.1, at most 60"),
         ("gatekeeper-worst:switch_s=31", "at most 30"),

@@ -186,10 +186,10 @@ def test_a_process_is_used_again_but_nothing_of_the_game_before_is_left(team_of,
     first = team_of(code)
     assert play(first, 1) == [{"agent_0": 4, "agent_1": 16, "agent_2": 16}]
     first.close()
-    kept = [worker.pid for worker in process._IDLE]
+    kept = [worker._process.pid for worker in process._IDLE]
     assert kept
     second = team_of(code)
-    assert second._process._worker.pid in kept
+    assert second._process._worker._process.pid in kept
     assert play(second, 1) == [{"agent_0": 4, "agent_1": 16, "agent_2": 16}]
     assert "MARK" not in os.environ
 

@@ -90,19 +90,21 @@ def read_of(make_link):
         boat.rates_given = False
         time.sleep(0.3)
         for k in range(10):
-            boat.latitude, boat.longitude, boat.speed, boat.yaw = (
-                42.0001 + 1e-6 * k,
-                -70.9999 - 1e-6 * k,
-                0.1 * k,
-                0.3 * k,
-            )
-            place = boat.latitude, boat.longitude
-            boat.obeys = False
-            boat.send_attitude()
-            boat.send_position(lat=round(place[0] * 1e7), lon=round(place[1] * 1e7))
             course = (0.3 * k - math.radians(30.0)) % (2.0 * math.pi)
-            assert wait_for(lambda course=course: abs(link.read().heading_rad - course) < 0.002)
-            assert wait_for(lambda k=k: abs(link.read().speed_mps - 0.1 * k) < 0.006)
+
+            def told(k=k, course=course):
+                """Say it, again until it is heard: the boat's own thread may have moved it meanwhile."""
+                boat.obeys = False
+                boat.latitude, boat.longitude = 42.0001 + 1e-6 * k, -70.9999 - 1e-6 * k
+                boat.speed, boat.yaw = 0.1 * k, 0.3 * k
+                place = boat.latitude, boat.longitude
+                boat.send_attitude()
+                boat.send_position(lat=round(place[0] * 1e7), lon=round(place[1] * 1e7))
+                time.sleep(0.02)
+                said = link.read()
+                return abs(said.heading_rad - course) < 0.002 and abs(said.speed_mps - 0.1 * k) < 0.006
+
+            assert wait_for(told)
             reading = link.read()
             found["position"].append([round(v, 3) for v in (*reading.position_m, reading.speed_mps)])
             found["attitude"].append(
