@@ -138,10 +138,10 @@ class OnceCommand(TyperCommand):
 class App(typer.Typer):
     """Commands of the kind `OnceCommand`, made by `command`."""
 
-    def command(self, name: str | None = None, *, defaults: dict[str, Any] | None = None, **settings: Any) -> Made:
-        """As Typer's; ``defaults``: see `command`."""
+    def command(self, name: str | None = None, **settings: Any) -> Made:  # type: ignore[override]
+        """As Typer's; ``defaults``: a dict, see `command`."""
+        make = command(**settings.pop("defaults", {}))
         register = super().command(name, **{"cls": OnceCommand, **settings})
-        make = command(**(defaults or {}))
         return lambda function: register(function if function in _MADE else make(function))
 
 

@@ -171,7 +171,8 @@ class Shield:
         self._barriers.renew()
         deciders.decide(self._keep_from(static, deciders.scene))
         self._barriers.tell()
-        sent, changed, reason, told = (values[place] for values in self._decided(deciders.scene))
+        sent, changed, reason, told = self._decided(deciders.scene)
+        sent, changed, reason, told = sent[place], changed[place], reason[place], told[place]
         commands = within.replaced(changed, sent, fleet.state[:, L.HEADING]) if changed.any() else within
         if cut is not None:
             reason[cut & (reason == W.PASSED)] = W.LIMITED
