@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, NamedTuple, get_args, get_type_hints
+from typing import Annotated, Any, NamedTuple, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,6 +95,8 @@ class Games(NamedTuple):
     rng: Annotated[NDArray[np.uint64], ()]  # state of each game's random numbers
 
 
+_KINDS: dict[Any, type] = {Array: np.float64, IntArray: np.int64, BoolArray: np.bool_, NDArray[np.uint64]: np.uint64}
+
 CAPTURE, GRAB, TAG, OUT = 0, 1, 2, 3
 """Columns of ``events``."""
 
@@ -136,5 +138,5 @@ def make_games(config: GameConfig, n_games: int) -> Games:
     arrays = {}
     for name, kind in get_type_hints(Games, include_extras=True).items():
         axes = [config.n_boats if axis == "n" else axis for axis in kind.__metadata__ if axis != ()]
-        arrays[name] = np.zeros((n_games, *axes), dtype=get_args(get_args(kind.__origin__)[1])[0])
+        arrays[name] = np.zeros((n_games, *axes), dtype=_KINDS[kind.__origin__])
     return share(Games(**arrays))
