@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from copy import deepcopy
 from functools import lru_cache
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from .jit import Array, BoolArray, IntArray
 from .masks import passing
 from .model import boats_of, missing_tables
 from .platforms import layout as L
+from .renamed import warn
 from .surroundings import OPEN_WATER, Surroundings, off_m
 from .tracks import carry_over, steps_of_delay, who_stayed
 from .workspace import Scene, Static
@@ -137,7 +138,14 @@ class Shield:
             fleet.check()
             twin._deciders_of(fleet, twin._static(OPEN_WATER))
 
-    def decide(self, fleet: Fleet, nominal: Commands, surroundings: Surroundings | None = None) -> Decisions:
+    def decide(
+        self,
+        fleet: Fleet,
+        nominal: Commands | None = None,
+        surroundings: Surroundings | None = None,
+        *,
+        wanted: Commands | None = None,
+    ) -> Decisions:
         """Decide for all controlled boats of a fleet.
 
         Manoeuvres are found one boat at a time, in the order of names: the same boats get the same commands, bit for
@@ -148,6 +156,7 @@ class Shield:
             nominal: what each boat is to do, n rows; rows of boats not controlled are passed through. Speeds beyond
                 what a boat's platform does are cut first (not those of `Commands.game_deg`).
             surroundings: static constraints now, when they differ from the ones given at construction.
+            wanted: earlier name of ``nominal``; it warns, and goes with the next release.
 
         Returns:
             One decision per boat, in the fleet's order.
@@ -158,6 +167,10 @@ class Shield:
             ConfigError: the surroundings are of another kind or leave nothing of the field.
         """
         started = time.perf_counter()
+        if wanted is not None:
+            warn("wanted", "nominal")
+            nominal = wanted
+        nominal = cast(Commands, nominal)  # whatever it is, `_check` looks
         around = self.surroundings if surroundings is None else surroundings
         _check(fleet, nominal, self.config)
         static = self._static(around)

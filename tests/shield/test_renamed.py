@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 from steerclear.shield import Commands, Fleet, Shield, ShieldConfig
+from steerclear.shield.exceptions import FleetError
 from steerclear.shield.renamed import DECISION, DECISIONS, PROFILES, SETTINGS, current_settings
 
 
@@ -58,3 +59,13 @@ def test_stored_settings_are_read_without_a_warning(caplog):
     assert current_settings(stored, warned=True) == now
     assert "adversary_s is now adversary_horizon_s" in caplog.text
     assert "rammers is now ramming" in caplog.text
+
+
+def test_decide_takes_nominal_commands_by_their_old_name_too_and_warns():
+    fleet = Fleet.of(position_m=[[0, 0]], heading_rad=[0.0], speed_mps=[1.0], team=[0], platforms="heron")
+    commands = Commands.absolute_deg([[1.0, 0.0]])
+    with pytest.warns(DeprecationWarning, match="'wanted' is now 'nominal'"):
+        old = Shield().decide(fleet, wanted=commands)
+    assert (old.filtered.values == Shield().decide(fleet, commands).filtered.values).all()
+    with pytest.raises(FleetError, match="decide takes a Fleet and Commands"):
+        Shield().decide(fleet)
