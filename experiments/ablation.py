@@ -119,6 +119,14 @@ class AblationSettings:
         """The rows of the two states that goals and replay are of."""
         return table[~(table["shielded"] & table["covered"])] if self.covered and len(table) else table
 
+    def goals(self, table: pd.DataFrame) -> list[dict[str, Any]]:
+        """Judge these games."""
+        return [] if pairs_of(table).empty else check(game_goals(self.separation_m), table)
+
+    def heads(self, pairing: str) -> dict[str, str]:
+        """By state (off, on, difference) what a pairing's tables call it, where not as `tables.COLUMNS` does."""
+        return {}
+
     def experiment(self, command: str) -> Experiment:
         """What `runner.execute` runs."""
         compiles = [compile_game, *([compile_shield] if any(self.states) else [])]
@@ -138,8 +146,8 @@ def quick(settings: AnySettings, max_time_s: float, games: int) -> AnySettings:
 def results_of(run: Run, settings: AblationSettings, is_quick: bool = False) -> dict[str, Any]:
     """Put together the content of results.json, which `docs_keys.KEYS` describes, of what was played."""
     rows = with_states(run.rows, settings.covered)
-    first = settings.off_and_on(run.table)
-    goals = [] if pairs_of(first).empty else check(game_goals(settings.separation_m), first)
+    goals = settings.goals(settings.off_and_on(run.table))
+    pairings = pairings_of(pd.DataFrame(rows), settings.radii_m, settings.seed)
     named = ("pairing", "game", "shielded", "state", "error", "fault")
     failed = []
     for job in run.failed:
@@ -157,7 +165,7 @@ def results_of(run: Run, settings: AblationSettings, is_quick: bool = False) -> 
         "failed": [{name: job[name] for name in named} for job in failed],
         "warnings": failure_warnings(rows),
         "held": held_games(rows),
-        "pairings": pairings_of(pd.DataFrame(rows), settings.radii_m, settings.seed),
+        "pairings": [one | ({"heads": heads} if (heads := settings.heads(one["pairing"])) else {}) for one in pairings],
         "goals": goals,
         "breaches": all_breaches(rows),
         "deprecated": {"bars": goals},

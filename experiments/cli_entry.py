@@ -95,7 +95,9 @@ def _stands_in(found: dict[str, Any]) -> str:
 
 
 def _kept(shield: dict[str, Any] | None) -> str:
-    return f"its shield keeps {shield['separation_m']:g} m, {shield['profile']}" if shield else "no shield in it"
+    return (
+        f"its shield keeps {shield['separation_m']:g} m, profile {shield['profile']}" if shield else "no shield in it"
+    )
 
 
 def time_text(time_ms: float) -> str:
@@ -123,7 +125,7 @@ def report(
     looks: Annotated[int, o.option("N", "Pairs of games to keep as replays, 0 to 3.")] = 2,
     answer_time: o.AnswerTime = ANSWER_S,
 ) -> None:
-    """Play an entry bare, as the zip that `entry wrap` writes, and with the shield round the game; write entry.html.
+    """Play an entry alone, as the zip that `entry wrap` writes, and with the shield round the game; write entry.html.
 
     Exit status: 0 done, 2 bad input or an entry that never played, 130 interrupted.
     """

@@ -238,7 +238,7 @@ def replay(
     """Run the shield again on a recorded log and prove that it decides the same, bit for bit.
 
     Exit status: 0 all decisions are proved the same, 1 a decision differs or something else was sent, 2 bad input, 3
-    not all is proved: turns are missing, no decisions, or the log is not as it was written, 130 interrupted.
+    not all is proved: turns missing from the log, no decisions, or the log is not as it was written, 130 interrupted.
     """
     started = time.perf_counter()
     check_ending(html, "--html", ".html", ".htm")
@@ -286,7 +286,7 @@ def fit(
     ] = None,
     json_file: o.JsonFile = None,
 ) -> None:
-    """Fit a boat to its logs: model, delay and a margin that covers 99 % of what it misses on held-out runs.
+    """Fit a boat to its logs: model, delay, and a model-error margin that covers 99 % of held-out runs.
 
     Exit status: 0 done, 2 bad input or too little to fit, 130 interrupted.
     """

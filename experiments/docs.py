@@ -190,7 +190,11 @@ def price_page(found: Sequence[Results], folder: Path) -> Page:
     for (preset, radius_m, pairing), runs in sorted(groups.items()):
         runs.sort(key=lambda run: run[0])
         hits = {kind: breach_column(kind, radius_m) for kind in _KINDS}
-        columns = (*_PRICE_COLUMNS, ("hits opp.", hits["opponent"], "on"), ("hits mates", hits["teammate"], "on"))
+        columns = (
+            *_PRICE_COLUMNS,
+            ("hits opponents", hits["opponent"], "on"),
+            ("hits teammates", hits["teammate"], "on"),
+        )
         rows = []
         for (always, visiting), content, summary in runs:
             figures = [summary["metrics"].get(key, {}).get(state) for _, key, state in columns]

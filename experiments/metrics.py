@@ -72,8 +72,8 @@ def game_metrics_of(radii_m: Sequence[float] = RADII_M) -> list[Metric]:
     """
     mates = "entries of two own boats into that radius, per pair"
     opponents = "entries of an own boat and an opponent into that radius, per pair"
-    driven = "of both, those of an own boat that the game drove (tagged, out of bounds), which obeys no policy"
-    changed = "% of the shield's decisions that differ from what was wanted; the column of a game: a fraction"
+    driven = "of both, those of an own boat that the game controlled (tagged, out of bounds), which obeys no policy"
+    changed = "% of the shield's decisions that differ from the nominal command; the column of a game: a fraction"
     stuck = "pairs of own boats that want to move and stood still for over 10 s"
     reversals = "changes of the commanded side of turn (beyond 5 deg) per boat and minute"
     scored = "as the game counts them, once a decision: entries into the sum of radii, for each own boat in it"
@@ -84,9 +84,9 @@ def game_metrics_of(radii_m: Sequence[float] = RADII_M) -> list[Metric]:
         Metric("grabs", "count", "grabs", "", "flags grabbed"),
         Metric("tags", "count", "tags", "", "tags made"),
         Metric("tags_against", "count", "times tagged", "", "tags made by the other team: times tagged"),
-        *(Metric(breach_column("teammate", r), "count", f"hits mates {r:g} m", "", mates) for r in radii_m),
-        *(Metric(breach_column("opponent", r), "count", f"hits opp. {r:g} m", "", opponents) for r in radii_m),
-        *(Metric(breach_column("driven", r), "count", f"hits driven {r:g} m", "", driven) for r in radii_m),
+        *(Metric(breach_column("teammate", r), "count", f"hits teammates {r:g} m", "", mates) for r in radii_m),
+        *(Metric(breach_column("opponent", r), "count", f"hits opponents {r:g} m", "", opponents) for r in radii_m),
+        *(Metric(breach_column("driven", r), "count", f"game-controlled {r:g} m", "", driven) for r in radii_m),
         Metric("clean_games", "share", "games without hit", "", "whether the game had no hit at all", paired=False),
         Metric("closest_m", "mean", "closest, mean m", "m", "closest distance of an own boat to any other, m"),
         Metric("closest_m", "least", "closest of all, m", "m", "smallest of all games", "", "closest_of_all_m", False),
@@ -96,8 +96,13 @@ def game_metrics_of(radii_m: Sequence[float] = RADII_M) -> list[Metric]:
         *(
             Metric(column, "mean", label, unit, meaning, paired=False, of_shield=True)
             for column, label, unit, meaning in (
-                ("mean_heading_change_deg", "mean change, deg", "deg", "mean |sent - wanted| heading, changed steps"),
-                ("mean_speed_change_mps", "mean change, m/s", "m/s", "mean |sent - wanted| speed, changed steps"),
+                (
+                    "mean_heading_change_deg",
+                    "mean change, deg",
+                    "deg",
+                    "mean |filtered - nominal| heading, changed steps",
+                ),
+                ("mean_speed_change_mps", "mean change, m/s", "m/s", "mean |filtered - nominal| speed, changed steps"),
                 ("decision_p50_us", "decision p50, us", "us", "half of a team's decisions took no longer"),
                 ("decision_p99_us", "decision p99, us", "us", "99 of 100 of them took no longer"),
             )
@@ -112,7 +117,7 @@ def game_metrics_of(radii_m: Sequence[float] = RADII_M) -> list[Metric]:
 
 
 REASONS = {
-    "least_change": "the command nearest to the wanted one that leaves every boat what its backup keeps, by quadratic "
+    "least_change": "the command nearest to the nominal one that leaves every boat what its backup keeps, by quadratic "
     "program or line search",
     "qp": "the least change of the quadratic program, as results of 0.8.0 and before name it",
     "qp_relaxed": "the program's answer where not all could be kept, better than any backup",
@@ -122,7 +127,7 @@ REASONS = {
     "best_effort": "no manoeuvre keeps the radius: the one that keeps most of it",
     "held": "the policy asked for nothing usable (no number, or absurdly large): the boat is told to stop on course",
     "right_of_way": "two teammates kept each other from turning: one gives way, one stands on",
-    "limited": "the wanted speed is beyond what the boat does: cut to that, and so it is safe",
+    "limited": "the nominal speed is beyond what the boat does: cut to that, and so it is safe",
     "stopped": "beyond the hard line, or about to touch an obstacle: the boat is told to stop, as the settings say",
 }
 """Why a command was changed, by name of the reason, small letters."""

@@ -30,7 +30,11 @@ NOTE = (
 )
 HINDSIGHT = (
     "With every other boat's actual track, could own commands of the last 30 s have kept the radius? 'Last moment' is "
-    "how long before the breach that was still so; who let the later of both boats' last moments pass is responsible."
+    "how long before the hit that was still so; who let the later of both boats' last moments pass is responsible."
+)
+OF_AN_ENTRY = (
+    "Shield on is the shield round the game, ten times a second; headlines compare it with the entry alone. "
+    "Pairings of the zip are played with the shield in it, and drawn in the colour of shield off."
 )
 IMAGES = "; img-src data:"
 
@@ -186,11 +190,11 @@ def game_report(results: Mapping[str, Any]) -> Report:
         links=results.get("replays") or (),
         goals=goals_of(results),
         plots=_plots(pairings, games, separation_m) if games else (),
-        notes=[NOTE],
+        notes=[NOTE, *([OF_AN_ENTRY] if settings.get("zip_file") else [])],
         sections=[
             Section("Pairings", [*map(_pairing_table, pairings)], COVERED_WORDS if settings.get("covered") else ""),
             Section(
-                "Breaches judged in hindsight",
+                "Hits judged in hindsight",
                 [*map(_verdict_table, pairings), *([_breaches_table(breaches)] if breaches else [])],
                 HINDSIGHT,
             ),
@@ -229,6 +233,7 @@ def _played(settings: Mapping[str, Any]) -> tuple[str, str]:
 def _tiles(pairings: Sequence[Summary], separation_m: float) -> list[Tile]:
     """The numbers that matter most, means over all games."""
     hits = f"centres within {separation_m:g} m, per game"
+    pairings = [one for one in pairings if one["games_off"] and one["games_on"]] or pairings
     tiles = []
     for label, key, note in (
         ("hits with opponents", breach_column("opponent", separation_m), hits),
@@ -344,4 +349,4 @@ def _breaches_table(breaches: Sequence[Mapping[str, Any]]) -> Table:
         }
         rows.append(shown)
     more = f"{len(order) - len(rows)} more in results.json." if len(order) > len(rows) else ""
-    return Table("Every judged breach", list(rows[0]), [list(row.values()) for row in rows], "", more, True, False)
+    return Table("Every judged hit", list(rows[0]), [list(row.values()) for row in rows], "", more, True, False)

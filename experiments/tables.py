@@ -46,8 +46,9 @@ class Table:
 
 
 def columns_of(summary: Mapping[str, Any]) -> dict[str, str]:
-    """The `COLUMNS` that some figure of a pairing (of `ablation.pairings_of`) has."""
-    return {k: head for k, head in COLUMNS.items() if any(k in figures for figures in summary["metrics"].values())}
+    """The `COLUMNS` that some figure of a pairing (of `ablation.pairings_of`) has, under its own ``heads``."""
+    heads = COLUMNS | (summary.get("heads") or {})
+    return {k: head for k, head in heads.items() if any(k in figures for figures in summary["metrics"].values())}
 
 
 def pairing_table(summary: Mapping[str, Any]) -> Group:
@@ -76,7 +77,7 @@ def figures_table(title: str, metrics: Iterable[Mapping[str, Any]], columns: Map
 def verdict_table(summary: Mapping[str, Any]) -> Group | None:
     """What the post-hoc analysis says about a pairing's breaches; None where it was not asked."""
     rows = verdict_rows(summary.get("verdicts") or {}, interval_text)
-    return titled("Breaches judged in hindsight", SHORT_HEADS, rows) if rows else None
+    return titled("Hits judged in hindsight", SHORT_HEADS, rows) if rows else None
 
 
 def titled(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+import os
+import traceback
 import unicodedata
 from collections.abc import Callable
 from functools import cache
@@ -74,14 +76,23 @@ def plain_text(text: object, most: int = 300, lines: bool = False) -> str:
     return "".join(c if c.isprintable() else "?" for c in " ".join(kept.split()))[:most]
 
 
+_OURS = tuple(
+    os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), folder, "")
+    for folder in ("shield", "env", "policies", "experiments")
+)
+_LIBRARIES = (os.path.join("lib", "python"), f"{os.sep}site-packages{os.sep}", "<frozen ")
+
+
 def describe_error(error: BaseException) -> str:
-    """Type, text and place of an error raised by foreign code, in one line that a terminal can be shown."""
+    """Type, text and place of an error raised by foreign code, in one line that a terminal can be shown.
+
+    The place is the last line of theirs that was running; where a library or we raised, that is named after it.
+    """
     try:
         text = plain_text(error)
     except Exception:  # its own __str__ may raise, too
         text = "(no text)"
-    where = error.__traceback__
-    while where is not None and where.tb_next is not None:
-        where = where.tb_next
-    place = "" if where is None else f" ({where.tb_frame.f_code.co_filename}:{where.tb_lineno})"
-    return plain_text(f"{type(error).__name__}: {text}{place}", 900)
+    lines = [(frame.f_code.co_filename, line) for frame, line in traceback.walk_tb(error.__traceback__)]
+    theirs = [place for place in lines if not place[0].startswith(_OURS) and not any(k in place[0] for k in _LIBRARIES)]
+    places = [f"{file}:{line}" for file, line in dict.fromkeys([*theirs[-1:], *lines[-1:]])]
+    return plain_text(f"{type(error).__name__}: {text}" + f" ({', raised in '.join(places)})" * bool(places), 900)

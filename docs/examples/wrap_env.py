@@ -13,6 +13,5 @@ observations, infos = env.reset(seed=4)
 for _ in range(50):
     observations, rewards, terminated, truncated, infos = env.step({agent: 4 for agent in env.agents})
 decision = infos["agent_0"]["shield"]
-print(
-    decision.reason.name, f"margin {decision.safety_margin_m:.2f} m", "changed" if decision.intervened else "as wanted"
-)
+changed = "changed" if decision.intervened else "as requested"
+print(decision.reason.name, f"margin {decision.safety_margin_m:.2f} m", changed)

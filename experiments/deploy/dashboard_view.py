@@ -6,6 +6,7 @@ Banners, columns, reasons and keys are data with their meaning, of which the ope
 from __future__ import annotations
 
 import math
+import re
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -22,6 +23,7 @@ from steerclear.shield.decision import Decision, Reason
 from steerclear.shield.fleet import Fleet
 
 from .dashboard_map import COLOURS, SYMBOLS, FieldMap
+from .plain import LINES
 
 MOST_ACTIONS = 6
 """Responses in effect that are told in words."""
@@ -35,10 +37,10 @@ COLUMNS = {
     "hdg": (4, "heading, degrees clockwise from the field's y axis"),
     "m/s": (5, "speed"),
     "age": (5, "seconds since its position was true; red: older than the limit"),
-    "nominal": (9, "what the policy, or a response, wants: speed m/s and heading"),
+    "nominal": (9, "what the policy, or a response, requests: speed m/s and heading"),
     "filtered": (9, "what the shield made of it, as it left; cyan: changed by the shield"),
     "why": (9, "why the shield sent that, see below; red: the mode that keeps it from obeying"),
-    "margin": (6, "how much more room than required its best manoeuvre keeps, m; red: less than required"),
+    "margin": (6, "safety margin: how much more room than required its manoeuvre keeps, m; red: less than required"),
     "closest": (14, "whom it meets closest when all hold course, how near and when; yellow: too near"),
     "constraint": (12, "what its command had to give way to"),
 }
@@ -55,7 +57,7 @@ WHY = {
     Reason.BEST_EFFORT: (
         "best eff.",
         "bold red",
-        "no manoeuvre keeps the margin, this one most of it: give it room, or SPACE",
+        "no manoeuvre keeps the required distance, this one most of it: give it room, or SPACE",
     ),
     Reason.HELD: ("held", "magenta", "the nominal command is unusable: told to stop on its course"),
     Reason.NOT_COVERED: ("-", "dim", "this shield does not decide for the boat"),
@@ -87,7 +89,7 @@ BANNERS = {
     ),
     "nothing": ("Nothing yet", "black on yellow", "no turn of the loop yet: wait"),
     "silent": (
-        "The loop stands still: no tick for {0:.1f} s",
+        "The loop stands still: no turn for {0:.1f} s",
         _RED,
         "the runner is stuck; boats stop by themselves (ArduPilot 3 s, MOOS 2 s after a command): take them by hand",
     ),
@@ -113,7 +115,7 @@ KEYS = (
 )
 KEY_LINE = "   ".join(f"{key} {words}" for key, words, _ in KEYS)
 HEAD = (
-    ("tick N", "turns of the loop so far"),
+    ("turn N", "turns of the loop so far"),
     ("N s, blue A : B red", "the referee's clock and score; *no referee*: nobody keeps the game"),
     ("policy N", "seconds since the policy's answer was right; beyond `limits.policy` a response is due"),
     ("late N ms, at most M", "how much later than due the last 100 turns began, on average and at most"),
@@ -121,7 +123,7 @@ HEAD = (
 
 
 def dashboard_page() -> str:
-    """What every line of the dashboard means, for the operator's page, in Markdown."""
+    """What every line of the dashboard and of ``--plain`` means, for the operator's page, in Markdown."""
     parts = {
         "first line": HEAD,
         "banner": [
@@ -133,6 +135,10 @@ def dashboard_page() -> str:
         "mark beside a name": [(mark, meaning) for mark, _, meaning in MARKS],
         "why": [(words, meaning) for words, _, meaning in WHY.values()],
         "key": [(key, f"{words}: {meaning}") for key, words, meaning in KEYS],
+        "line of `--plain`": [
+            (re.sub(r"{[^}]*}", "...", words).replace("  ", "(indented) "), meaning)
+            for words, meaning in LINES.values()
+        ],
     }
     rows = [f"| {part} | {what} | {meaning} |" for part, lines in parts.items() for what, meaning in lines]
     return "\n".join(["| where | it shows | what it means, and what to do |", "|---|---|---|", *rows])
@@ -221,7 +227,7 @@ class View:
         if tick is not None:
             late = f"late {1e3 * moment.late_s[0]:.1f} ms, at most {1e3 * moment.late_s[1]:.1f}"
             line = "   ".join(
-                [line, f"tick {tick.number}", _score(tick.game), f"policy {_age(tick.policy_age_s)}", late]
+                [line, f"turn {tick.number}", _score(tick.game), f"policy {_age(tick.policy_age_s)}", late]
             )
         name, values = moment.banner()
         words, style, _ = BANNERS[name]

@@ -12,6 +12,28 @@ from steerclear.shield.decision import Reason
 from steerclear.shield.fleet import Fleet
 from steerclear.shield.platforms import layout as L
 
+EVERY_S = 5.0
+"""Between two lines, s."""
+LINES = {
+    "time": ("{:6.0f} s", f"seconds since the first turn; a line every {EVERY_S:g} s"),
+    "alone": ("no other boat", "nobody else is known: nothing to keep clear of"),
+    "closest": (
+        "closest {:5.1f} m",
+        "how near our boats came to any other since the last line, as believed; too near: Ctrl-C, or by hand",
+    ),
+    "changed": (
+        "{} of {} commands changed",
+        "of our boats' commands since the last line, those the shield changed",
+    ),
+    "policy": ("policy {:.0f} ms old", "since the policy's answer was right; beyond `limits.policy` a response is due"),
+    "undecided": ("no decision", "no boat of ours is ready: each one's line or the checks say why"),
+    "effect": (
+        "  {}",
+        "a response in effect and why; once, and of a boat outside the operating area every time",
+    ),
+}
+"""What the lines say: words, what they mean and what to do; the operator's page is made of it."""
+
 
 class Tally:
     """Counts decisions and keeps the closest approach of own boats to any other; a `TickSink`.
@@ -55,7 +77,7 @@ class Tally:
             "best_effort_commands": float(self.best_effort),
             "ticks_with_actions": float(self.responses),
             "closest_m": self.closest_m,
-            "least_certificate_m": self.least_m,
+            "least_safety_margin_m": self.least_m,
         }
 
 
@@ -74,7 +96,7 @@ class PlainLines:
     geofence every time, since how far matters.
     """
 
-    def __init__(self, say: Callable[[str], None], every_s: float = 5.0) -> None:
+    def __init__(self, say: Callable[[str], None], every_s: float = EVERY_S) -> None:
         self._say, self._every_s = say, every_s
         self._tick: Tick | None = None
         self._began_s = math.nan
@@ -102,14 +124,18 @@ class PlainLines:
             if tick is None:
                 continue
             since, self._tally = self._tally, Tally()  # no lock: the loop is never to wait for this thread
-            said = "no decision"
+            said = [_say("undecided")]
             if tick.fleet is not None and tick.decisions is not None:
-                near = "no other boat" if math.isinf(since.closest_m) else f"closest {since.closest_m:5.1f} m"
-                changed = f"{since.changed} of {since.commands} commands changed"
-                said = f"{near}, {changed}, policy {1e3 * tick.policy_age_s:.0f} ms old"
-            self._say(f"{tick.began_s - self._began_s:6.0f} s  {said}")
+                near = _say("alone") if math.isinf(since.closest_m) else _say("closest", since.closest_m)
+                changed = _say("changed", since.changed, since.commands)
+                said = [near, changed, _say("policy", 1e3 * tick.policy_age_s)]
+            self._say(f"{_say('time', tick.began_s - self._began_s)}  {', '.join(said)}")
             new = {(action.subject, action.condition, action.response): action.text for action in tick.actions}
             for key, text in new.items():
                 if key not in self._told or key[1] == "geofence":
-                    self._say(f"  {text}")
+                    self._say(_say("effect", text))
             self._told = set(new)
+
+
+def _say(name: str, *values: object) -> str:
+    return LINES[name][0].format(*values)

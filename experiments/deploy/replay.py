@@ -201,7 +201,7 @@ def as_content(replay: Replay) -> dict[str, Any]:
 
 def show(console: Console, replay: Replay) -> None:
     """Print the whole report."""
-    for part in (*_log_lines(replay), *_chain_lines(replay.chain), *_proof_lines(replay), *_tables(replay)):
+    for part in (*_log_lines(replay), *_chain_lines(replay), *_proof_lines(replay), *_tables(replay)):
         console.print(part)
 
 
@@ -213,7 +213,7 @@ def _log_lines(replay: Replay) -> Iterator[RenderableType]:
     header = replay.header
     ours = [boat.name for boat in header.boats if boat.ours]
     whose = f", policy {header.policy}" * bool(header.policy) + f", own boats {', '.join(ours)}" * bool(ours)
-    yield Text(f"{replay.began}, {replay.seconds:.1f} s, {replay.proof.ticks} ticks{whose}")
+    yield Text(f"{replay.began}, {replay.seconds:.1f} s, {replay.proof.ticks} turns{whose}")
     if replay.origin:
         yield Text(
             f"Made by {replay.made_by}. Not all is as here, and this program may decide otherwise:", style="yellow"
@@ -228,15 +228,19 @@ def _log_lines(replay: Replay) -> Iterator[RenderableType]:
     yield from _rest(len(replay.lines))
 
 
-def _chain_lines(chain: ChainCheck) -> Iterator[RenderableType]:
+def _chain_lines(replay: Replay) -> Iterator[RenderableType]:
+    chain = replay.chain
     if chain.broken:
-        yield Text("The log is not as it was written:", style="red")
+        yield Text("Hash chain: damaged. The log is not as it was written:", style="red")
         yield from (Text(f"  {text}") for text in chain.breaks[:MOST_ROWS])
         yield from _rest(chain.broken)
-    elif chain.codes_checked:
-        yield f"Its chain holds, and {chain.codes_checked} codes are of this key."
+        return
+    codes = "It carries no codes: it shows damage, not who wrote it."
+    if chain.codes_checked:
+        codes = f"{chain.codes_checked} codes are of this key."
     elif chain.keyed:
-        yield "Its chain holds. Its codes were not checked: give --key FILE, the key of the boats."
+        codes = "Its codes were not checked: give --key FILE, the key of the boats."
+    yield f"Hash chain: verified{'' if replay.complete else ' up to where the log ends'}. {codes}"
 
 
 def _proof_lines(replay: Replay) -> Iterator[RenderableType]:
@@ -248,13 +252,13 @@ def _proof_lines(replay: Replay) -> Iterator[RenderableType]:
     else:
         yield Text(
             f"{proof.same} of {proof.decisions} decisions are the same, {proof.different} differ, {proof.unproven} "
-            f"differ after missing ticks and are not proved ({len(proof.missing)} gaps).",
+            f"differ after turns missing from the log and are not proved ({len(proof.missing)} gaps).",
             style="red" if proof.different else "yellow",
         )
     if proof.missing:
         lost = sum(after - before - 1 for before, after in proof.missing if after > before)
         back = sum(after <= before for before, after in proof.missing)
-        text = f"{lost} turns are missing" + (f", {back} times they go back" if back else "")
+        text = f"{lost} turns are missing from the log" + (f", {back} times they go back" if back else "")
         yield Text(f"{text}: what was decided then is not proved.", style="yellow")
     if proof.first is not None:
         yield _first("First difference", proof.first, "recorded", "now")
@@ -273,13 +277,13 @@ def _proof_lines(replay: Replay) -> Iterator[RenderableType]:
 
 
 def _first(title: str, first: Difference, one: str, other: str) -> Text:
-    where = f"tick {first.tick} at {first.time_s:.2f} s, {first.boat or 'all boats'}, {first.what}"
+    where = f"turn {first.tick} at {first.time_s:.2f} s, {first.boat or 'all boats'}, {first.what}"
     return Text(f"{title}: {where}: {one} {first.recorded}, {other} {first.replayed}")
 
 
 def _tables(replay: Replay) -> Iterator[RenderableType]:
     if replay.actions:
-        table = Table("condition", "response", "subject", "ticks", title="Declared and in effect", title_justify="left")
+        table = Table("condition", "response", "subject", "turns", title="Declared and in effect", title_justify="left")
         for (condition, response, subject), count in replay.actions.most_common(MOST_ROWS):
             table.add_row(condition, response, subject, str(count))
         yield table

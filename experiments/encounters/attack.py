@@ -259,7 +259,7 @@ KEYS = {
     "searches[].history[]": "the least distance after each generation, m",
     "searches[].tried": "opponents played",
     "searches[].breached": "of those, how many got within the radius",
-    "searches[].judged[].*": "violations the analysis judged: distance, entries, certificate at the start, verdicts",
+    "searches[].judged[].*": "violations the analysis judged: distance, entries, safety margin at the start, verdicts",
     "searches[].scene": "file with the avoidable violation found; null without one",
     "failed[].*": "search that could not be run, and why",
     "found": "searches that found an avoidable violation",

@@ -1,4 +1,4 @@
-"""An entry's games three ways and their page: bare, as the zip that is handed in, with the shield round the game."""
+"""An entry's games three ways and their page: alone, as the zip that is handed in, with the shield round the game."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from steerclear.policies.submissions.made_for import made_for
 from steerclear.policies.submissions.stage import Stage
 
 from ..ablation import AblationSettings
-from ..metrics import breach_column
+from ..metrics import breach_column, check, game_goals
 from ..page import render, write_page
 from ..play.spec import MatchSpec
 from ..statistics import paired_difference
@@ -23,6 +23,8 @@ from .package import game_spec
 from .wrap import own_files, shielded_files, write_zip
 
 PAGE, ZIP = "entry.html", "shielded.zip"
+BARE, IN_ZIP, AROUND = "entry alone", "shield in the zip", "shield round the game"
+"""What a figure is of: no shield, that of the zip that is handed in, or one that decides ten times a second."""
 LOOKED = "a game, every step looked at"
 TILES = (
     ("opponents", "hits with opponents", LOOKED),
@@ -52,13 +54,31 @@ class EntryGames(AblationSettings):
         handed_in = AblationSettings(**{**own, "own": self.zip_file, "states": (False,)})
         return super().specs() + (handed_in.specs() if self.zip_file else [])
 
+    def goals(self, table: pd.DataFrame) -> list[dict[str, Any]]:
+        """Judge the zip, which is handed in, and then the shield round the game, each against the bare entry."""
+        bare = table[(table["own"] == self.own) & ~table["shielded"]]
+        of_zip = table[table["own"] == self.zip_file].assign(shielded=True)
+        of_zip = of_zip.assign(pairing=self.own + " vs " + of_zip["opponent"])
+        around = table[(table["own"] == self.own) & table["shielded"]]
+        return [
+            {**goal, "name": f"{words}: {goal['name']}"}
+            for words, games in ((IN_ZIP, of_zip), (AROUND, around))
+            if len(bare) and len(games)
+            for goal in check(game_goals(self.separation_m), pd.concat([bare, games]))
+        ]
+
+    def heads(self, pairing: str) -> dict[str, str]:
+        """Which shield the figures of a pairing are of."""
+        if self.zip_file and pairing.startswith(f"{self.zip_file} vs "):
+            return {"off": IN_ZIP}
+        return {"off": BARE, "on": AROUND, "difference": "difference, paired"}
+
     def how_many(self) -> str:
         """How many games that are, in words."""
-        ways = "bare, as the zip that is handed in, with the shield round the game"
-        ways = ways if self.zip_file else "without the shield, with it"
+        ways = ", ".join([BARE, *([IN_ZIP] if self.zip_file else []), AROUND])
         each, number = f"{self.games} game{'s' if self.games != 1 else ''}", len(self.opponents)
         against = f"each of {number} opponents" if number != 1 else self.opponents[0]
-        return f"{each} against {against}, {ways}: {len(self.specs())} games in all"
+        return f"{each} against {against}; {ways}: {len(self.specs())} games in all"
 
 
 def shielded_zip(
@@ -84,7 +104,7 @@ def shielded_zip(
 
 
 def by_opponent(rows: Sequence[Row], settings: EntryGames) -> dict[str, list[pd.DataFrame]]:
-    """Games against each opponent that were played in every way: bare, (as the zip,) with the shield round the game.
+    """Games against each opponent that were played in every way: alone, (as the zip,) with the shield round the game.
 
     Returns:
         Tables by game, with the columns ``net`` (captures made less given up), ``teammates`` and ``opponents`` (hits).
@@ -119,7 +139,7 @@ def write_entry_page(
         subtitle=f"{settings.preset}, the shield keeps {settings.separation_m:g} m: {settings.how_many()}, from the "
         "same seeds.",
         warnings=warnings,
-        ways=["bare", *(["the zip"] if settings.zip_file else []), "shield round the game"],
+        ways=[BARE, *([IN_ZIP] if settings.zip_file else []), AROUND],
         tiles=_tiles(groups),
         rows=[_opponent(name, ways, settings.seed) for name, ways in groups.items()],
         radius=f"{settings.separation_m:g} m",

@@ -46,7 +46,7 @@ def draw(judged: Judged, name: str, path: Path) -> None:
     for values, style, label in (
         ([judged.quantile_m(c, 0.5) for c in range(3)], "o-", "median"),
         ([judged.quantile_m(c, COVERED) for c in range(3)], "s-", "99 of 100"),
-        ([begin_m + growth * (at - 1.0) for at in AHEAD_S], ":", "margin"),
+        ([begin_m + growth * (at - 1.0) for at in AHEAD_S], ":", "model-error margin"),
     ):
         axes[4].plot(AHEAD_S, values, style, label=label, color="C3" if style == ":" else None)
     axes[4].legend(fontsize=8)
@@ -101,7 +101,7 @@ def promise(file: PlatformFile) -> list[str]:
     """What the shield then keeps, and what to do where that is little."""
     measured = file.measured
     if not measured:
-        return ["Nothing was measured of it: fit it to a log, so that the shield knows delay and margin."]
+        return ["Nothing was measured of it: fit it to a log, which tells delay and model-error margin."]
     error, delay_s = file.error_m(3.0), measured.get("delay_s", 0.0)
     within = ", ".join(f"{measured.get(f'error_{at}_s_m', float('nan')):.2f}" for at in (1, 3, 6))
     lines = [
@@ -116,5 +116,5 @@ def promise(file: PlatformFile) -> list[str]:
             "still water, tune the autopilot, or keep more separation_m."
         )
     if delay_s > LATE_S:
-        lines.append("That delay is long: a faster link or telemetry rate is worth more than any margin.")
+        lines.append("That delay is long: a faster link or telemetry rate is worth more than any model-error margin.")
     return lines

@@ -46,7 +46,7 @@ PLAYED_COLUMNS = {
     "lost beyond": "{0.tried_lost} of {0.tried:,}",
 }
 SETS_WORDS = f"""Positions of an opponent from which the radius is not sure to be kept, by area: where the shield's
-certificate is negative, and where the worst-case value table is below the radius. Both boats at full thrust; the
+safety margin is negative, and where the worst-case value table is below the radius. Both boats at full thrust; the
 heading is the opponent's relative to the own one, 180° is head-on. "Missed" is the area that the table calls lost and
 the shield calls safe, also as a share of the table's set: of each such position one of the two is wrong. The shield's
 pursuers are strategies, the table's opponent is the worst that its grid and horizon can tell

@@ -65,8 +65,8 @@ class Pane {
       badge(breached ? "breach" : "", ...this.breachText()));
     const word = (text, kind) => element("span", { className: kind, textContent: text });
     this.note.replaceChildren("timeline: ", word("share of boats whose command was changed", "orange"), ", ",
-      word("breaches", "pink"), ", captures · table: speeds m/s, compass headings, margin = room beyond the required one, m, safe from 0 up · ",
-      `breach: a boat of `, this.sideText(this.game.ownTeam), ` within ${meta.separation_m} m of another, discs touch; `,
+      word("hits", "pink"), ", captures · table: speeds m/s, compass headings, margin = safety margin, room beyond the required distance, m · ",
+      `hit: a boat of `, this.sideText(this.game.ownTeam), ` within ${meta.separation_m} m of another, discs touch; `,
       `dashed rings: the other team among itself · `,
       `${meta.preset}, ${[...new Set(meta.platforms)].join(", ")}, seed ${meta.seed ?? "unknown"}`);
     this.rows.replaceChildren(...meta.agent_ids.map((name, boat) => this.makeRow(name, boat)));
@@ -81,7 +81,7 @@ class Pane {
   /** How often boats came too close, the other team among itself apart: no shield answers for that. */
   breachText() {
     const { ownTeam, ownBreaches, breaches } = this.game, other = breaches.length - ownBreaches.length;
-    const parts = [this.sideText(ownTeam), `: ${ownBreaches.length} breach${ownBreaches.length === 1 ? "" : "es"}`];
+    const parts = [this.sideText(ownTeam), `: ${ownBreaches.length} hit${ownBreaches.length === 1 ? "" : "s"}`];
     return other ? [...parts, ` (and ${other} among `, this.sideText(1 - ownTeam), ")"] : parts;
   }
 
@@ -164,7 +164,7 @@ class Pane {
       const bits = [[HAS_FLAG, "flag"], [TAGGED, "tagged"], [OUT, "out"]];
       const states = bits.filter(([mask]) => game.bit(boat, step, mask)).map(([, text]) => text);
       const near = inBreach.get(boat);
-      if (near) states.push(`${near.own ? "breach" : "close"} ${near.gap.toFixed(2)} m`);
+      if (near) states.push(`${near.own ? "hit" : "close"} ${near.gap.toFixed(2)} m`);
       texts[6] = states.join(", ");
       for (let k = 1; k < texts.length; k++) if (row.cells[k].textContent !== texts[k]) row.cells[k].textContent = texts[k];
       row.classList.toggle("changed", game.intervened(boat, step));

@@ -77,7 +77,7 @@ CONDITIONS = {
         Condition(
             "model.off",
             "A boat is farther than `model.outside_m` from where its model has it 2 s ahead.",
-            "prediction against telemetry; its margin grows from the first error on",
+            "prediction against telemetry; its model-error margin grows from the first error on",
             "`model.then`",
             within="`model.after_s`",
             disables="the response to a boat far outside its model; the shield foretells it wrongly",

@@ -143,7 +143,7 @@ class ModelErrorMonitor:
             growing = f", growing to {goal:.2f} m" if goal > margin + 0.005 else ""
             is_bounded = self.quantile_m(name) > self._limit.widest_m >= goal
             bound = ", the most that limits.model.widest_m allows" if is_bounded else ""
-            text = f"{name}: its model misses {missed} m 1/2/3 s ahead (95 of 100); margin {margin:.2f} m{growing}"
-            text += f"{bound}; if it stays so, steerclear fit this run's log"
+            text = f"{name}: its model misses {missed} m 1/2/3 s ahead (95 of 100); "
+            text += f"model-error margin {margin:.2f} m{growing}{bound}; if it stays so, steerclear fit this run's log"
             found.append(Action(name, "tracking", "none", text))
         return found

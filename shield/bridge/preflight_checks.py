@@ -176,11 +176,11 @@ def check_certificate(fleet: FleetFile, tracker: Tracker, obstacles: StaticObsta
     nearest_m = float(np.hypot(*(others - given.position_m[worst]).T).min(initial=math.inf))
     near = ", ".join(answer[worst].active_constraints) or "the others"
     return found(
-        "nobody near" if margin > NEAR_MARGIN_M else f"least margin {margin:.2f} m ({name})",
+        "nobody near" if margin > NEAR_MARGIN_M else f"least safety margin {margin:.2f} m ({name})",
         {"safety_margin_m": margin, "nearest_m": nearest_m},
         (
             not margin >= 0.0,
-            f"{name} has a margin of {margin:.2f} m beyond the separation; move it away from {near}",
+            f"{name} has a safety margin of {margin:.2f} m; move it away from {near}",
         ),
     )
 

@@ -100,7 +100,7 @@ def test_both_figures_are_in_results_tables_and_pages_and_goals_are_of_the_first
     assert summary["verdicts"]["covered"]["games"] == 1
     text = printed(covered_table(summary), 80)
     assert "covered - off, paired" in text
-    assert "hits driven 2.5 m" in text
+    assert "game-controlled 2.5 m" in text
     write_results(run, results)
     content = json.loads((run.folder / "results.json").read_text())
     assert undocumented(content, KEYS["ablate"]) == []

@@ -8,6 +8,7 @@ import pytest
 from steerclear import policies
 from steerclear.policies.adapters import call_fault
 from steerclear.shield.exceptions import PolicyError
+from steerclear.shield.foreign import describe_error
 
 OF_2024 = "self, agent_id:int, observation_normalized:list, observation:dict"
 OWN = ("agent_0", "agent_1", "agent_2")
@@ -142,6 +143,24 @@ def test_a_boat_whose_code_raises_holds_and_the_others_play_on(game, caplog):
     assert len(caplog.records) == 1
     assert "crew" in caplog.text
     assert "agent_1" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("body", "place"),
+    [
+        ("raise ValueError('x')", "theirs.py:2)"),
+        ("__import__('json').loads('{')", "theirs.py:2, raised in "),
+        ("__import__('steerclear.shield.foreign').shield.foreign.plain_text(3, most='a')", "theirs.py:2, raised in "),
+    ],
+)
+def test_an_error_names_their_line_before_ours_or_a_librarys(body, place):
+    names = {}
+    exec(compile(f"def play():\n    {body}\n", "theirs.py", "exec"), names)
+    with pytest.raises(Exception) as raised:  # noqa: PT011
+        names["play"]()
+    told = describe_error(raised.value)
+    assert place in told
+    assert "test_policies_guard" not in told
 
 
 def test_every_kind_of_failure_is_told_apart_and_dated(game):

@@ -85,7 +85,7 @@ def test_a_submission_plays_a_demonstration_and_its_log_is_proved(tmp_path, link
     options = ("--policy", "our_team", "--minutes", "0.4", "--plain", "--json", "run.json")
     said = steerclear(tmp_path, "deploy", "--demo", "--link", link, *options)
     assert ("moosdb:blue_1" in said) == (link == "moos")
-    for words in ("turns", "commands changed by the shield", "turns missed", "commands changed"):
+    for words in ("turns", "commands changed by the shield", "turns skipped", "commands changed"):
         assert words in said
     assert link == "moos" or "blue_1: in HOLD" in said
     content = json.loads((tmp_path / "run.json").read_text())

@@ -110,7 +110,7 @@ def test_what_is_wrong_is_said(stream):
 def test_the_banner_says_the_worst_that_is_so(stream):
     tick = stream.tick(5.0)
     for moment, words in (
-        (Moment(tick, tick.began_s + 2.0), "stands still: no tick for 2.0 s"),
+        (Moment(tick, tick.began_s + 2.0), "stands still: no turn for 2.0 s"),
         (Moment(tick, 99.0, stopped="keyboard"), "STOP ALL by keyboard"),
         (Moment(tick, 99.0, stopped="keyboard", hard=True), "past the shield;"),
         (Moment(tick, 5.0, ended="SIGINT"), "The run ends (SIGINT)"),

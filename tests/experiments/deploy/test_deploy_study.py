@@ -122,7 +122,7 @@ def test_the_readmes_one_command_plays_and_shows_the_dashboard(tmp_path):
     os.close(ours)
     text = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", shown.decode("utf-8", "replace"))
     assert runner.returncode == 0, text[-2000:]
-    for word in ("SPACE or s STOP ALL", "blue_3", "red_3", "turns missed", "blue_1: in HOLD"):
+    for word in ("SPACE or s STOP ALL", "blue_3", "red_3", "turns skipped", "blue_1: in HOLD"):
         assert word in text
     (path,) = tmp_path.rglob("*.mcap")
     with LogReader(path) as log:

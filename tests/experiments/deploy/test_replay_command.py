@@ -68,21 +68,25 @@ WRITTEN_ANEW = {
     "a lie in the last bits": (
         lambda ticks: [lied(tick, 1e-12) if tick.number == 30 else tick for tick in ticks],
         (1,),
-        ("159 of 160 decisions are the same, 1 differ", "First difference: tick 30 at 3.00 s, blue_1, safety_margin_m"),
+        ("159 of 160 decisions are the same, 1 differ", "First difference: turn 30 at 3.00 s, blue_1, safety_margin_m"),
     ),
     "a tick dropped and every later decision forged": (
         lambda ticks: [*ticks[:29], *map(lied, ticks[30:])],
         (3,),
-        (f"{STEPS - 30} differ after missing ticks and are not proved (1 gaps)", "1 turns are missing", "NOT PROVED"),
+        (
+            f"{STEPS - 30} differ after turns missing from the log and are not proved (1 gaps)",
+            "1 turns are missing from the log",
+            "NOT PROVED",
+        ),
     ),
-    "a tick dropped": (lambda ticks: ticks[:29] + ticks[30:], (3,), ("1 turns are missing",)),
-    "the first ticks left out": (lambda ticks: ticks[10:], (3,), ("10 turns are missing",)),
+    "a tick dropped": (lambda ticks: ticks[:29] + ticks[30:], (3,), ("1 turns are missing from the log",)),
+    "the first ticks left out": (lambda ticks: ticks[10:], (3,), ("10 turns are missing from the log",)),
     "speeds of the links altered, the chain made anew": (
         lambda ticks: [sent_as(tick, lambda _: {"speed_mps": 0.7}) for tick in ticks],
         (1,),
         (
             f"{2 * STEPS} commands are not what was decided",
-            "First of them: tick 0 at 0.00 s, blue_1, speed: decided 2.0",
+            "First of them: turn 0 at 0.00 s, blue_1, speed: decided 2.0",
         ),
     ),
     "no decisions": (
@@ -122,7 +126,10 @@ ALTERED = {
     "cut and closed again": (
         lambda records: records[: len(records) // 2],
         3,
-        ("The log is not as it was written: its end was cut off and the file closed again", "the same bit for bit"),
+        (
+            "Hash chain: damaged. The log is not as it was written: its end was cut off and the file closed again",
+            "the same bit for bit",
+        ),
     ),
     "speeds altered": (
         lambda records: changed_tick(
@@ -182,7 +189,7 @@ def test_a_log_that_was_killed_is_told_as_such_not_as_forged_and_is_mended(tmp_p
         code, said = run(path)
         assert code == 0, said
         assert "not closed (crash, power or kill)" in said
-        assert "not as it was written" not in said
+        assert "Hash chain: verified up to where the log ends. It carries no codes" in said
     assert run(path, "--mend", tmp_path / "mended.mcap")[0] == 0
     code, said = run(tmp_path / "mended.mcap")
     assert code == 0

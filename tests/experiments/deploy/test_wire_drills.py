@@ -16,7 +16,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from steerclear.shield.bridge.mavlink.signing import SigningClock
 from steerclear.shield.platforms import layout as L
 
-DOC = Path(__file__).parents[3] / "docs" / "boat_reference.md"
+DOC = Path(__file__).parents[3] / "docs" / "studies" / "boats.md"
 STRIKE_S, AFTER_S = 4.0, 14.0
 
 

@@ -146,11 +146,14 @@ def test_a_report_is_a_page_with_the_games_to_look_at(write_entry):
     assert all(Path("out", name).exists() for name in links)
     results = json.loads(Path("out/results.json").read_text())
     assert undocumented(results, KEYS["entry report"]) == []
-    assert (
-        "1 game against hold, bare, as the zip that is handed in, with the shield round the game: 3 games in all"
-        in (done.stderr.replace("\n", " "))
+    assert "1 game against hold; entry alone, shield in the zip, shield round the game: 3 games in all" in (
+        done.stderr.replace("\n", " ")
     )
     assert results["games_played"] == 3
+    assert [one["heads"]["off"] for one in results["pairings"]] == ["entry alone", "shield in the zip"]
+    judged = {goal["name"].partition(":")[0] for goal in results["goals"]}
+    assert judged == {"shield in the zip", "shield round the game"}
+    assert all(words in done.stdout for words in ("entry alone", "shield in the zip", "shield round the game"))
     assert made_for("out/shielded.zip").shielded
     again = run("report", entry, *settings)
     assert again.exit_code == ExitCode.BAD_INPUT
@@ -166,7 +169,7 @@ def test_a_report_of_an_entry_that_has_a_shield_or_of_other_rules_plays_no_zip(w
 
     monkeypatch.setattr("steerclear.experiments.cli_entry.run_games", played)
     told = run("report", write_entry("return 4"), "--preset", "mctf2025", "--opponents", "hold", "--games", "2").stderr
-    assert "zip '', 2 games against hold, without the shield, with it: 4 games in all" in told.replace("\n", " ")
+    assert "zip '', 2 games against hold; entry alone, shield round the game: 4 games in all" in told.replace("\n", " ")
 
 
 @pytest.mark.parametrize(("jobs", "processes"), [([], available_cores()), (["--jobs", "3"], 3)])
@@ -212,10 +215,8 @@ def test_the_zip_stands_between_bare_and_the_shield_round_the_game(tmp_path):
     )
     rows = [*ROWS, row(0, False, 4, opponents=2, own="s.zip"), row(1, False, 0, mates=2, own="s.zip")]
     page = write_entry_page(rows, settings, tmp_path, [], []).read_text()
-    assert (
-        "4 games against &lt;them&gt;, bare, as the zip that is handed in, with the shield round the game: 12" in page
-    )
-    for words in ("3 → 4 → 2", "6 → 2 → 0", "0 → 2 → 1", "bare → the zip → shield round the game"):
+    assert "4 games against &lt;them&gt;; entry alone, shield in the zip, shield round the game: 12" in page
+    for words in ("3 → 4 → 2", "6 → 2 → 0", "0 → 2 → 1", "entry alone → shield in the zip → shield round the game"):
         assert words in page, words
 
 

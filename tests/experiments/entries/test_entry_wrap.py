@@ -148,7 +148,7 @@ def test_it_says_which_game_and_which_shield_it_is_for(wrapped, tmp_path):
     )
     file = tmp_path / "c.json"
     done = run("check", path, "--max-time", 2, "--json", file)
-    assert "made by steerclear for preset mctf2026; its shield keeps 4 m, ramming" in done.stdout
+    assert "made by steerclear for preset mctf2026; its shield keeps 4 m, profile ramming" in done.stdout
     assert json.loads(file.read_text())["made_for"]["shield"] == told["shield"]
     assert undocumented(json.loads(file.read_text()), KEYS["entry check"]) == []
 

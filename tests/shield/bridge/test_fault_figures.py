@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from bridge_fakes import pair
 
-DOC = Path(__file__).parents[3] / "docs" / "boat_reference.md"
+DOC = Path(__file__).parents[3] / "docs" / "studies" / "boats.md"
 STRUCK_S, AFTER_S = 1004.0, 20.0
 LATE = "limits: {navigation: {max_age_s: 1.5, then: stop}}"
 

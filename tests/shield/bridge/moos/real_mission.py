@@ -233,7 +233,7 @@ def play(seconds: float = 180.0) -> dict[str, float]:
         "separation violations with teammates": float(violations["teammate"]),
         "separation violations with opponents": float(violations["opponent"]),
         "turns": float(len(ticks)),
-        "turns missed": float(missed),
+        "turns skipped": float(missed),
         "turns under way": float(moved),
         "commands changed, share": sum(t.decisions.count_intervened for t in ticks if t.decisions is not None)
         / max(1, 3 * proof.decisions),
