@@ -10,9 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
-import pandas as pd
 from steerclear import policies
 from steerclear.shield.exceptions import ConfigError
 
@@ -29,6 +28,9 @@ from .statistics import DIFFERENCE, summarise
 from .verdicts import COVERED, OFF, ON, all_breaches, state_of, summarise_verdicts
 from .warming import compile_game, compile_judge, compile_shield
 from .workers import Row, Workers
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 COVERED_DIFFERENCE = f"{DIFFERENCE}_{COVERED}"
 """What the difference of covered and off is called in results; that of on and off is `DIFFERENCE`."""
@@ -145,6 +147,8 @@ def quick(settings: AnySettings, max_time_s: float, games: int) -> AnySettings:
 
 def results_of(run: Run, settings: AblationSettings, is_quick: bool = False) -> dict[str, Any]:
     """Put together the content of results.json, which `docs_keys.KEYS` describes, of what was played."""
+    import pandas as pd
+
     rows = with_states(run.rows, settings.covered)
     goals = settings.goals(settings.off_and_on(run.table))
     pairings = pairings_of(pd.DataFrame(rows), settings.radii_m, settings.seed)
@@ -186,6 +190,8 @@ def pairings_of(table: pd.DataFrame, radii_m: Sequence[float], seed: int = 0) ->
         ``policy_failures``; where games were played covered also ``games_covered``, and per metric ``covered`` and
         ``difference_covered``.
     """
+    import pandas as pd
+
     if table.empty:
         return []
     metrics = game_metrics_of(radii_m)

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import qpsolvers
 from numpy.typing import NDArray
 from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
@@ -261,6 +260,8 @@ def solver_times(programs: Sequence[Program], repeats: int) -> list[dict[str, An
         with an answer that passes the shield's own check) and `differs` (largest difference from the first's
         answers, scaled inputs; None where they never both answer).
     """
+    import qpsolvers
+
     names = [REFERENCE, *sorted(set(qpsolvers.available_solvers) - {REFERENCE})]
     ways: dict[str, Callable[[Program], Array | None]] = {name: lambda p, name=name: solve(p, name) for name in names}
     rows, first, first_us = [], list[Array | None](), None

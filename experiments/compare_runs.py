@@ -6,15 +6,17 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import pandas as pd
 from steerclear.shield.exceptions import ConfigError
 
 from .metrics import Metric, game_metrics_of
 from .result_files import read_json
 from .runner import OLD_ROWS_FILE, RESULTS_FILE, ROWS_FILE, job_id, read_line
 from .statistics import DIFFERENCE, summarise
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 COMMANDS = ("ablate", "evaluate", "entry report")
 SAME = ("preset", "rules", "fixed_start", "penalty")
@@ -59,6 +61,8 @@ def _games(
     folder: Path, settings: Mapping[str, Any], seeds: Sequence[int], shielded: bool
 ) -> tuple[pd.DataFrame, frozenset[str]]:
     """The games of a run that count, and digests of the code that played them."""
+    import pandas as pd
+
     old = (folder / OLD_ROWS_FILE).exists()
     path = folder / (OLD_ROWS_FILE if old else ROWS_FILE)
     try:
@@ -145,6 +149,8 @@ def compare_runs(first: PlayedRun, second: PlayedRun, seed: int = 0) -> dict[str
 
 def _paired(first: PlayedRun, second: PlayedRun) -> pd.DataFrame:
     """Games of both from the same seeds, against the same files of the opponent, one below the other."""
+    import pandas as pd
+
     for run in (first, second):
         if run.table.empty:
             raise ConfigError(f"{run.folder} holds no game of its settings; play it again into a folder of its own")

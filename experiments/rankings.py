@@ -9,15 +9,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import permutations
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import pandas as pd
-from scipy import stats
 from steerclear.shield.jit import Array
 
 from .play.spec import SIDES
 from .statistics import bootstrap_interval, count_interval, mean_interval, paired_ratio
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Row = Mapping[str, Any]
 RESAMPLES = 2000
@@ -73,6 +74,8 @@ def seats(rows: Sequence[Row]) -> pd.DataFrame:
     Beside the columns of rows: ``team``, ``side``, ``*_against`` of the other side, ``net_captures``, ``hits``,
     ``avoidable`` (NaN where not judged).
     """
+    import pandas as pd
+
     lines = []
     for row in rows:
         for own, other in zip(SIDES, SIDES[::-1], strict=True):
@@ -145,7 +148,9 @@ def score_of(figures: Array, penalty: float) -> Array:
 
 def ranks_of(figures: Array, penalty: float) -> Array:
     """(..., teams) ranks by score from (..., teams, figures); equal scores share the best rank, as in the paper."""
-    return np.asarray(stats.rankdata(-np.round(score_of(figures, penalty), 9), method="min", axis=-1))
+    from scipy.stats import rankdata  # importing it takes half a second
+
+    return np.asarray(rankdata(-np.round(score_of(figures, penalty), 9), method="min", axis=-1))
 
 
 def standings(totals: Totals, penalty: float, seed: int) -> list[dict[str, Any]]:

@@ -32,15 +32,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import pandas as pd
 from filelock import BaseFileLock
 from steerclear.shield.exceptions import ConfigError
 
 from .provenance import code_digest, machine, versions
 from .result_files import lock_folder, plain_value, told_settings, write_json, write_table, writing
 from .workers import Job, Row, Workers, end_failed, outcomes
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 EXPERIMENT_FILE, ROWS_FILE, RESULTS_FILE = "experiment.json", "rows.jsonl", "results.json"
 OLD_ROWS_FILE = "games.jsonl"
@@ -95,6 +97,8 @@ class Run:
     @cached_property
     def table(self) -> pd.DataFrame:
         """One line per row."""
+        import pandas as pd
+
         return pd.DataFrame(self.rows)
 
     def head(self) -> dict[str, Any]:

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import stats
 from steerclear.shield.exceptions import ConfigError
 
 if TYPE_CHECKING:
@@ -42,13 +41,20 @@ class Interval:
 NAN = float("nan")
 
 
+def _distributions() -> Any:
+    """SciPy's: importing them takes half a second, which commands without intervals do not need."""
+    from scipy import stats
+
+    return stats
+
+
 def share_interval(successes: int, trials: int) -> Interval:
     """Wilson score interval of a share; without trials the limits are 0 and 1, and there is no value."""
     if not 0 <= successes <= trials:
         raise ConfigError(f"a share needs 0 <= successes <= trials; got {successes} of {trials}")
     if trials == 0:
         return Interval(NAN, 0.0, 1.0)
-    limits = stats.binomtest(successes, trials).proportion_ci(CONFIDENCE, method="wilson")
+    limits = _distributions().binomtest(successes, trials).proportion_ci(CONFIDENCE, method="wilson")
     return Interval(successes / trials, float(limits.low), float(limits.high))
 
 
@@ -65,8 +71,8 @@ def count_interval(events: int, exposure: float = 1.0) -> Interval:
         raise ConfigError(f"a rate needs events >= 0 and exposure > 0; got {events} over {exposure}")
     if events == 0:
         return Interval(0.0, 0.0, -np.log1p(-CONFIDENCE) / exposure)
-    low = stats.chi2.ppf(TAIL, 2 * events) / 2.0
-    high = stats.chi2.ppf(1.0 - TAIL, 2 * (events + 1)) / 2.0
+    low = _distributions().chi2.ppf(TAIL, 2 * events) / 2.0
+    high = _distributions().chi2.ppf(1.0 - TAIL, 2 * (events + 1)) / 2.0
     return Interval(events / exposure, float(low) / exposure, float(high) / exposure)
 
 
@@ -83,7 +89,9 @@ def student_interval(values: ArrayLike) -> Interval:
     mean = float(found.mean()) if len(found) else NAN
     if len(found) < 2 or np.ptp(found) == 0.0:
         return Interval(mean, NAN, NAN)
-    reach = float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, len(found) - 1) * found.std(ddof=1) / np.sqrt(len(found)))
+    reach = float(
+        _distributions().t.ppf(0.5 + 0.5 * CONFIDENCE, len(found) - 1) * found.std(ddof=1) / np.sqrt(len(found))
+    )
     return Interval(mean, mean - reach, mean + reach)
 
 
@@ -121,8 +129,8 @@ def count_ratio_interval(off: int, on: int) -> Interval:
     if off == on == 0:
         return Interval(NAN, 0.0, infinite)
     tail = TAIL if off and on else 2.0 * TAIL
-    low = float(stats.beta.ppf(tail, on, off + 1)) if on else 0.0
-    high = float(stats.beta.ppf(1.0 - tail, on + 1, off)) if off else 1.0
+    low = float(_distributions().beta.ppf(tail, on, off + 1)) if on else 0.0
+    high = float(_distributions().beta.ppf(1.0 - tail, on + 1, off)) if off else 1.0
     low, high = (share / (1.0 - share) if share < 1.0 else infinite for share in (low, high))
     return Interval(on / off if off else infinite, low, high)
 
@@ -179,7 +187,7 @@ def upper_bound(events: int, trials: int) -> float:
     """One-sided upper limit of a probability (Clopper and Pearson 1934); 1 without trials."""
     if trials == 0 or events >= trials:
         return 1.0
-    return float(stats.beta.ppf(CONFIDENCE, events + 1, trials - events))
+    return float(_distributions().beta.ppf(CONFIDENCE, events + 1, trials - events))
 
 
 def figure(table: pd.DataFrame, metric: Metric, seed: int = 0) -> tuple[Interval, int]:

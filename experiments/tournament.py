@@ -6,10 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from itertools import combinations
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 from steerclear import policies
 from steerclear.shield.exceptions import ConfigError
 
@@ -22,6 +21,9 @@ from .result_files import table_name
 from .runner import RESULTS_FILE, Experiment, Notice, Run, execute
 from .warming import compile_game, compile_judge, compile_shield
 from .workers import Job, Row, Workers
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 OFF, ALL = "off", "all"
 FINAL, QUALIFYING = "final", "qualifying"

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 from steerclear.env.config import GameConfig
 from steerclear.env.record import NOT_COVERED, Record, find_breaches, make_record
@@ -250,6 +249,8 @@ def record_of(header: LogHeader, tracks: Tracks, states: Array, title: str, shie
     Boats that are not there stay where they were last, or will be first. Without ``shielded`` they were sent what was
     wanted.
     """
+    import pandas as pd
+
     flat = pd.DataFrame(states[..., :_SEEN].reshape(len(states), -1)).ffill().bfill().fillna(0.0)
     seen = flat.to_numpy().reshape(*states.shape[:2], _SEEN)
     covered = shielded & (tracks.reason != NOT_COVERED)

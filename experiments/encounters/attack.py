@@ -21,8 +21,6 @@ from typing import Any
 
 import numpy as np
 from rich.console import Group
-from scipy.optimize import differential_evolution
-from scipy.stats import qmc
 from steerclear.shield.jit import Array
 
 from ..baselines.registry import check_filter, is_shield
@@ -165,6 +163,9 @@ def run_search(search: Search) -> dict[str, Any]:
     """
     hunt = Hunt(search)
     random = np.random.default_rng([search.seed, search.restart, 7])
+    from scipy.optimize import differential_evolution
+    from scipy.stats import qmc
+
     start = qmc.LatinHypercube(hunt.genes, rng=random).random(search.population)
     differential_evolution(
         hunt.merits,

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import pandas as pd
 from steerclear.env.config import GameConfig
 from steerclear.policies.submissions.made_for import made_for
 from steerclear.policies.submissions.stage import Stage
@@ -21,6 +20,9 @@ from ..tables import interval_text, number_text
 from ..workers import Row
 from .package import game_spec
 from .wrap import own_files, shielded_files, write_zip
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 PAGE, ZIP = "entry.html", "shielded.zip"
 BARE, IN_ZIP, AROUND = "entry alone", "shield in the zip", "shield round the game"
@@ -109,6 +111,8 @@ def by_opponent(rows: Sequence[Row], settings: EntryGames) -> dict[str, list[pd.
     Returns:
         Tables by game, with the columns ``net`` (captures made less given up), ``teammates`` and ``opponents`` (hits).
     """
+    import pandas as pd
+
     columns = {f"{kind}s": breach_column(kind, settings.separation_m) for kind in ("teammate", "opponent")}
     table = pd.DataFrame(rows).rename(columns={column: name for name, column in columns.items()})
     table["net"] = table["captures"] - table["captures_against"]
@@ -150,6 +154,8 @@ def write_entry_page(
 
 def _tiles(groups: Mapping[str, Sequence[pd.DataFrame]]) -> list[tuple[str, list[str], str]]:
     """Label, a figure a game for each way, and a note."""
+    import pandas as pd
+
     ways = [pd.concat(each) for each in zip(*groups.values(), strict=True)]
     return [
         (label, [number_text(float(games[column].mean()) if len(games) else 0.0) for games in ways], note)
@@ -170,6 +176,8 @@ def games_to_look_at(rows: Sequence[Row], settings: EntryGames, most: int) -> li
 
     Each pair once, at most so many.
     """
+    import pandas as pd
+
     groups = [(ways[0], ways[-1]) for ways in by_opponent(rows, settings).values()]
     off, on = (pd.concat(games).reset_index() for games in zip(*groups, strict=True)) if groups else (None, None)
     if off is None or on is None:

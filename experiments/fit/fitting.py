@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares
 from steerclear.shield.exceptions import PlatformError
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms.files import PlatformFile
@@ -73,6 +72,8 @@ def fit_model(model: Model, runs: Sequence[Run], top_mps: float) -> Fit:
 
 def _least(model: Model, runs: Sequence[Run], top_mps: float, start: Array, most: int) -> Fit:
     room = 1e-6 * (model.high - model.low)
+    from scipy.optimize import least_squares  # importing it takes a while
+
     found = least_squares(
         lambda vector: residuals(model, vector, runs, top_mps),
         np.clip(start, model.low + room, model.high - room),

@@ -7,10 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
-import pandas as pd
 from steerclear.policies.entrants.learned import read_weights
 from steerclear.shield.exceptions import ConfigError
 
@@ -22,6 +21,9 @@ from ..statistics import Interval, difference, figure, student_interval
 from ..workers import Job, Row, end_failed
 from .config import SHIELDS, Config, config_of
 from .training import CURVE, FINAL, play_games, summary_of, training_of
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 COMMAND = "train-study"
 COLLISION = {"off": 0.0, "on": 0.25}
@@ -45,7 +47,7 @@ CHANGES = {
     **{f"shield, deployment to shield, {one}": (("deployment", "off"), (one, "off")) for one in SHIELDS[2:]},
 }
 """What is compared, by trainings of the same seed: shield and collision term before and after."""
-Cells = Mapping[tuple[str, str], pd.DataFrame]
+Cells: TypeAlias = "Mapping[tuple[str, str], pd.DataFrame]"
 
 
 def trainings_of(base: Config, folder: Path, seeds: int, games: int) -> list[Job]:
@@ -154,6 +156,8 @@ def _check_same(training: Mapping[str, Any], folder: Path) -> None:
 
 def learning_page(found: Sequence[Mapping[str, Any]], folder: Path) -> tuple[str, str, list[Path]]:
     """File name, text and pictures of the page."""
+    import pandas as pd
+
     lines = ["# Learning with a shield beside the reward", "", MADE, ""]
     for content in found:
         rows = pd.DataFrame(content["rows"])
@@ -230,6 +234,8 @@ def _against(cells: Cells) -> list[str]:
 
 def _while_learning(cells: Cells) -> list[str]:
     """How fast teams learned: the games of the trainings themselves."""
+    import pandas as pd
+
     rows = []
     for (shield, collision), cell in cells.items():
         if shield != "deployment":

@@ -9,7 +9,6 @@ import math
 from itertools import combinations
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from .catalogue import entrant
 from .plane import GAP_M, STOP_MPS, Order, ahead, assign, clip, cross, distance, heading_to, meeting_point, row, wrap
@@ -126,6 +125,8 @@ def _marked(sight: Sight) -> list[Point]:
     points = [[met(boat, foe) for foe in sight.foes] for boat in sight.own]
     costs = np.array([[distance(boat.at, p) for p in some] for boat, some in zip(sight.own, points, strict=True)])
     found = [boat.at for boat in sight.own]
+    from scipy.optimize import linear_sum_assignment  # importing it takes a while
+
     for boat, foe in zip(*linear_sum_assignment(costs), strict=True):
         found[int(boat)] = points[int(boat)][int(foe)]
     return found

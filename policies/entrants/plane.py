@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from .sight import Boat, Point, Sight
 
@@ -100,6 +99,8 @@ def assign(starts: Sequence[Point], ends: Sequence[Point]) -> list[int]:
     """For each start the number of its end, the sum of all distances being least; -1 where ends are fewer."""
     costs = np.array([[distance(a, b) for b in ends] for a in starts])
     chosen = [-1] * len(starts)
+    from scipy.optimize import linear_sum_assignment  # importing it takes a while
+
     for start, end in zip(*linear_sum_assignment(costs), strict=True):
         chosen[int(start)] = int(end)
     return chosen

@@ -15,8 +15,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-import qpsolvers
-from scipy.sparse import csc_matrix
 
 from ..exceptions import SolverError
 from ..jit import Array
@@ -66,7 +64,11 @@ def check_solver(name: str) -> None:
     Raises:
         SolverError: it is not; the message lists those that are.
     """
-    if name != COMPILED and name not in qpsolvers.available_solvers:
+    if name == COMPILED:
+        return
+    import qpsolvers  # it and scipy take a quarter of a second, which the compiled solver does not need
+
+    if name not in qpsolvers.available_solvers:
         raise SolverError(
             f"QP solver {name!r} is unknown to qpsolvers or not installed; choose one of "
             f"{', '.join([COMPILED, *sorted(qpsolvers.available_solvers)])}, or install its package (pip install)"
@@ -80,6 +82,9 @@ def solve(program: Program, solver: str) -> Array | None:
     """
     if not all(np.isfinite(numbers).all() for numbers in (program.C, program.d, program.z0)):
         return None  # some backends take half a minute over these
+    import qpsolvers
+    from scipy.sparse import csc_matrix
+
     kind = np.asarray if solver in qpsolvers.dense_solvers else csc_matrix
     weight, rows, options = kind(np.eye(len(program.z0))), kind(-program.C), OPTIONS.get(solver, {})
     try:
