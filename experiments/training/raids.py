@@ -417,7 +417,7 @@ class RaidsTraining(Training):
             return asked
         ended += self._totals(self.batch.tallies.flat_totals(), over)
         self._close(over, answers)
-        self.batch.reset(learners=np.repeat(over, BOATS))
+        self.batch.restart(over)
         self._restart(over)
         return np.union1d(asked[~over[asked]], self.team.advance(np.flatnonzero(over))).astype(np.int64)
 

@@ -53,11 +53,11 @@ class Tallies:
         self.step[6] += self._core.new_collisions[:, self._boats] * going[:, None]
         self.step[7] += changed & going[:, None]
 
-    def end_decision(self, rewards: Array, going: BoolArray) -> None:
-        """Add the decision to the games that were under way (B,)."""
+    def end_decision(self, rewards: Array) -> None:
+        """Add the decision to its games."""
         self.totals += self.step
         self.reward += rewards
-        self.length += going
+        self.length += 1
 
     def forget(self, games: Any) -> None:
         """Begin the games (B,) bool anew."""

@@ -92,7 +92,6 @@ class TeamBatch:
         self._games_filter = self._filter  # of the games themselves: what learns may put another in its place
         self._commands = np.zeros((core.n_games, core.n_boats, 2))
         self._seed = seed
-        self._begun = False
         self._born_s = time.perf_counter()
         self.tallies = Tallies(core, self.team, self.boats)
 
@@ -101,23 +100,17 @@ class TeamBatch:
         """Highest top speed of the learners' boats, m/s."""
         return float(np.max(self.core.max_speed_mps[self.boats]))
 
-    def reset(self, seed: int | None = None, learners: Any = None) -> NDArray[np.float32]:
-        """Start games; returns observations (L, n_obs).
+    def reset(self, seed: int | None = None) -> NDArray[np.float32]:
+        """Start all games; returns observations (L, n_obs).
 
         Args:
-            seed: seed of games and opponent; None: the last one for all games, else each goes on with its numbers.
-            learners: (L,) bool, which learners' games to start, all boats of a game alike; None for all.
+            seed: seed of games and opponent; None: the last one.
 
         Raises:
-            ConfigError: no such choice of games, or no seed.
+            ConfigError: no seed.
         """
         if seed is not None and (isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0):
             raise ConfigError(f"seed is {seed!r}; give one whole number from 0 for all games, or None")
-        if learners is not None:
-            if not self._begun:
-                raise ConfigError("no game has begun; reset all games first, without a mask")
-            return self._begin_anew(self._games_of(learners), self._flat(self.core.observations), seed)
-        self._begun = True
         self._seed = self._seed if seed is None else int(seed)
         observations = self.core.reset(seed=self._seed)
         if self.opponent is not None:
@@ -127,21 +120,15 @@ class TeamBatch:
         self._begin_counts(np.ones(self.core.n_games, np.bool_))
         return self._flat(observations)
 
-    def step(self, actions: Any, autoreset: bool = True, idle: Any = None) -> Stepped:
-        """One decision in all games, held for `interval` game steps.
-
-        Args:
-            actions: of all learners.
-            autoreset: ended games start anew.
-            idle: (B,) bool, games that begin anew instead of stepping: reward 0, not ended.
+    def step(self, actions: Any) -> Stepped:
+        """One decision of all learners, held for `interval` game steps; games that end in it start anew.
 
         Raises:
             PolicyError: the actions have the wrong shape, are out of range or not finite.
         """
         own = self._decode(actions)
         n_games, n_boats = self.core.n_games, len(self.boats)
-        waiting = np.zeros(n_games, np.bool_) if idle is None else idle
-        going, rewards = ~waiting, np.zeros((n_games, n_boats))
+        going, rewards = np.ones(n_games, np.bool_), np.zeros((n_games, n_boats))
         terminated, truncated = np.zeros(n_games, np.bool_), np.zeros(n_games, np.bool_)
         course_deg = self._heading_deg() + own[..., 1]
         final: Any = None
@@ -160,14 +147,13 @@ class TeamBatch:
             if not going.any():
                 break
         ended = terminated | truncated
-        self.tallies.end_decision(rewards, ~waiting)
+        self.tallies.end_decision(rewards)
         episodes = self.tallies.flat_totals()
         episodes["t"] = np.full(self.learners, time.perf_counter() - self._born_s)
         if ended.any() and hasattr(self.opponent, "ended"):
             self.opponent.ended(self.core, ended)
-        anew = (ended if autoreset else np.zeros_like(ended)) | waiting
         outcome = (self._spread(terminated), self._spread(truncated))
-        seen = self._begin_anew(anew, final)
+        seen = self._begin_anew(ended, final)
         return Stepped(seen, rewards.reshape(-1), *outcome, final, self.tallies.flat_step(), episodes)
 
     def action_masks(self) -> BoolArray:
@@ -213,26 +199,18 @@ class TeamBatch:
         if self.reward is not None:
             self.reward.begin(self, games)
 
-    def _games_of(self, learners: Any) -> BoolArray:
-        """(B,) bool, the games of learners (L,)."""
-        chosen = np.asarray(learners)
-        if chosen.shape != (self.learners,) or chosen.dtype != np.bool_:
-            raise ConfigError(
-                f"the mask is {chosen.dtype} of shape {chosen.shape}; give bool of shape ({self.learners},), one a boat"
-            )
-        by_game = chosen.reshape(self.core.n_games, -1)
-        if not chosen.any() or (by_game.any(axis=1) != by_game.all(axis=1)).any():
-            raise ConfigError("the mask must choose one game at least, and of each game all boats of the team or none")
-        return np.array(by_game[:, 0])
+    def restart(self, games: BoolArray) -> NDArray[np.float32]:
+        """Start the chosen games (B,) anew, each with its own random numbers going on; observations of all."""
+        return self._begin_anew(games, self._flat(self.core.observations))
 
-    def _begin_anew(self, ended: BoolArray, final: NDArray[np.float32], seed: int | None = None) -> NDArray[np.float32]:
-        """Start the games in ``ended`` (B,); with a seed from it, as `reset` starts all."""
+    def _begin_anew(self, ended: BoolArray, final: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Start the games in ``ended`` (B,)."""
         if not ended.any():
             return final
-        observations = self.core.reset(mask=ended, seed=seed)
+        observations = self.core.reset(mask=ended)
         if self.opponent is not None:
             self._seed += self.core.n_games
-            self.opponent.restart(ended, self._seed if seed is None else int(seed))
+            self.opponent.restart(ended, self._seed)
         if self.shield is not None:
             self.shield.reset(ended)
         self._begin_counts(ended)

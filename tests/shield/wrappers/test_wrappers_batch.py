@@ -160,57 +160,30 @@ def test_what_fits_no_batch_is_refused():
         batch(team="green")
 
 
-def masked(games, *chosen):
-    """A mask of learners: all boats of the chosen games."""
-    return np.repeat(np.isin(np.arange(GAMES), chosen), games.learners // GAMES)
-
-
-@pytest.mark.parametrize("seed", [None, 7])
-def test_a_masked_reset_starts_the_chosen_games_and_leaves_the_others(seed):
-    drawn = {"max_time_s": 60.0, "default_start": False}
-    env, other = (MctfVectorEnv(batch(True, "medium", **drawn)) for _ in range(2))
-    for one in (env, other):
-        one.reset(seed=1)
-        for _ in range(12):
-            seen = one.step(np.full(12, 4))[0]
-    mask = masked(env.batch, 1, 3)
-    started, infos = env.reset(seed=seed, options={"reset_mask": mask})
-    assert infos == {}
-    assert started[~mask].tobytes() == seen[~mask].tobytes()
-    assert env.batch.core.time_s.tolist() == pytest.approx([1.2, 0.0, 1.2, 0.0])
-    if seed is not None:
-        assert started[mask].tobytes() == MctfVectorEnv(batch(**drawn)).reset(seed=seed)[0][mask].tobytes()
-    for _ in range(10):
-        mine, theirs = (one.step(np.full(12, 4))[0] for one in (env, other))
-        assert mine[~mask].tobytes() == theirs[~mask].tobytes()
-        assert (mine[mask] != theirs[mask]).any(axis=1).all()
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"reset_mask": np.zeros(12, bool)}, "must choose one game at least"),
-        ({"reset_mask": np.arange(12) == 0}, "of each game all boats of the team or none"),
-        ({"reset_mask": np.ones(12)}, r"mask is float64 of shape \(12,\); give bool of shape \(12,\)"),
-        ({"reset_mask": np.ones(4, bool)}, r"mask is bool of shape \(4,\); give bool of shape \(12,\)"),
-        ({"init_dict": {}}, "unknown reset option 'init_dict'; known: reset_mask"),
-    ],
-)
-def test_options_of_a_reset_that_cannot_be_had_are_refused(options, words):
-    env = MctfVectorEnv(batch())
-    env.reset(seed=0)
-    with pytest.raises(ConfigError, match=words):
-        env.reset(options=options)
-    env.reset(options={})
-
-
-def test_resets_without_a_beginning_or_with_many_seeds_are_refused():
+@pytest.mark.parametrize("seed", [[1] * 12, -1, True, 1.5])
+def test_resets_with_options_or_many_seeds_are_refused(seed):
     env = MctfVectorEnv(batch(opponent="medium"))
-    with pytest.raises(ConfigError, match="no game has begun; reset all games first"):
-        env.reset(options={"reset_mask": np.ones(12, bool)})
-    for seed in ([1] * 12, -1, True, 1.5):
-        with pytest.raises(ConfigError, match="give one whole number from 0 for all games, or None"):
-            env.reset(seed=seed)
+    with pytest.raises(ConfigError, match="unknown reset options init_dict; how games start is in their GameConfig"):
+        env.reset(options={"init_dict": {}})
+    with pytest.raises(ConfigError, match="give one whole number from 0 for all games, or None"):
+        env.reset(seed=seed)
+
+
+def test_chosen_games_start_anew_and_the_others_go_on():
+    drawn = {"max_time_s": 60.0, "default_start": False}
+    games, other = (batch(True, "medium", **drawn) for _ in range(2))
+    for one in (games, other):
+        one.reset(1)
+        for _ in range(12):
+            seen = one.step(np.full(12, 4)).observations
+    mask = np.isin(np.arange(GAMES), (1, 3))
+    boats = np.repeat(mask, 3)
+    assert games.restart(mask)[~boats].tobytes() == seen[~boats].tobytes()
+    assert games.core.time_s.tolist() == pytest.approx([1.2, 0.0, 1.2, 0.0])
+    for _ in range(10):
+        mine, theirs = (one.step(np.full(12, 4)).observations for one in (games, other))
+        assert mine[~boats].tobytes() == theirs[~boats].tobytes()
+        assert (mine[boats] != theirs[boats]).any(axis=1).all()
 
 
 def test_options_set_by_stable_baselines_are_refused_once():

@@ -58,36 +58,22 @@ def test_a_game_that_ends_in_a_held_decision_ends_there():
     np.testing.assert_array_equal(games.core.time_s, 0.0)
 
 
-@pytest.mark.parametrize("mode", list(AutoresetMode))
-def test_the_three_ways_to_begin_anew(mode):
-    envs = MctfVectorEnv(batch(0.2), mode)
-    assert envs.metadata["autoreset_mode"] is mode
+def test_infos_tell_how_a_game_ended_and_the_next_goes_on():
+    envs = MctfVectorEnv(batch(0.2))
+    assert envs.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
     envs.reset(seed=1)
     stop = np.full(6, 16)
-    envs.step(stop)
-    last, _, terminated, truncated, infos = envs.step(stop)
+    assert "totals" not in envs.step(stop)[-1]
+    fresh, _, terminated, truncated, infos = envs.step(stop)
     assert (terminated | truncated).all()
     assert infos["_totals"].all()
-    assert ("final_obs" in infos) == (mode is AutoresetMode.SAME_STEP)
-    if mode is AutoresetMode.SAME_STEP:
-        assert envs.single_observation_space.contains(infos["final_obs"][0])
-        assert (infos["final_obs"] != last).any()
+    assert envs.single_observation_space.contains(infos["final_obs"][0])
+    assert (infos["final_obs"] != fresh).any()
     np.testing.assert_array_equal(infos["totals"]["l"], 2)
-    if mode is AutoresetMode.DISABLED:
-        with pytest.raises(ConfigError, match="games have ended; reset them"):
-            envs.step(stop)
-        envs.reset(options={"reset_mask": truncated})
-    if mode is AutoresetMode.NEXT_STEP:
-        fresh, rewards, _, over, _ = envs.step(stop)
-        assert not over.any()
-        np.testing.assert_array_equal(rewards, 0.0)
-        assert (fresh != last).any()
     assert not envs.step(stop)[3].any()
     assert envs.step(stop)[3].all()
 
 
-def test_unknown_ways_are_refused():
-    with pytest.raises(ConfigError, match="unknown autoreset_mode 'never'"):
-        MctfVectorEnv(batch(), "never")
+def test_no_interval_is_refused():
     with pytest.raises(ConfigError, match="interval is 0"):
         batch(interval=0)
