@@ -20,7 +20,6 @@ EXAMPLES = {
     "attack": "steerclear attack --platform heron --attackers 2 --out results/attack",
     "bench": "steerclear bench --quick",
     "compare": "steerclear compare results/before results/after",
-    "demonstrate": "steerclear demonstrate --opponent easy --out mine.parquet",
     "deploy": "steerclear deploy --demo --policy medium",
     "docs": "steerclear docs results/mine --out docs/studies",
     "encounters": "steerclear encounters --family rammer_1 --n 100 --guard none,shield",

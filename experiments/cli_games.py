@@ -1,11 +1,10 @@
-"""Commands that play games: play, demonstrate, evaluate, ablate; what they share."""
+"""Commands that play games: play, evaluate, ablate; what they share."""
 
 from __future__ import annotations
 
 import math
 import time
 from dataclasses import asdict, dataclass, replace
-from importlib.util import find_spec
 from itertools import count
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,25 +12,22 @@ from typing import Annotated, Any
 import typer
 from steerclear import policies
 from steerclear.env.mctf import MctfEnv
-from steerclear.policies.entrants.demonstrator import BOAT_KEYS, OPTION_KEYS, Demonstrator
 from steerclear.policies.registry import KEYBOARD
 from steerclear.shield.exceptions import ConfigError, PolicyError
-from steerclear.shield.extras import install_command
 
 from . import cli_options as o
 from .ablation import AblationSettings, held_games, replay_of, results_of, write_results
 from .ablation import quick as small_version
-from .cli_files import check_ending
 from .console import command, finish, out, progress, say, warn
 from .game_metrics import check_penalty
 from .metrics import RADII_M
 from .play.conditions import words_of, words_of_settings
-from .play.match import Match, play_match
+from .play.match import play_match
 from .play.spec import MatchSpec, check_shield
 from .policy_checks import check_run, made_of
 from .provenance import head_of
 from .replay_html import check_endings, save_record
-from .result_files import NEW, make_folder, write_json, write_table
+from .result_files import NEW, write_json
 from .runner import Run
 from .tables import COVERED_WORDS, covered_table, game_table, goals_table, pairing_table, verdict_table
 from .verdicts import check_judge
@@ -48,13 +44,6 @@ STEERING = (
     "you steer the ringed boat, while the window has the keyboard: up or w ahead, left and right or a and d turn, "
     "down or s back, Shift half speed, no key stop; close the window to end"
 )
-CHOOSING = (
-    f"{', '.join(BOAT_KEYS[:3])} choose a boat; "
-    + ", ".join(f"{key} {name}" for key, name in OPTION_KEYS.items())
-    + "; close the window to end"
-)
-DEMONSTRATED = ("easy", "medium")
-"""Opponents of a demonstration."""
 
 
 @dataclass(frozen=True)
@@ -152,44 +141,6 @@ def play(
 
 def _until_closed(env: MctfEnv) -> bool:
     return env.renderer is None or not env.renderer.window_closed
-
-
-@command()
-def demonstrate(
-    opponent: o.Opponent = "easy",
-    preset: o.Preset = "aamas2024",
-    side: o.Side = "blue",
-    shield: o.Shielded = True,
-    seed: o.Seed = 0,
-    speed: Annotated[float, o.option("X", "Times faster than the game, in a window.")] = 2.0,
-    file: Annotated[Path, o.option("FILE.parquet", "Where demonstrations go; a new file.", "--out"), NEW] = Path(
-        "demonstration.parquet"
-    ),
-    max_time: o.MaxTime = None,
-) -> None:
-    """Play in a window by choosing an option for each boat; keep what was chosen, and at what sight, as Parquet.
-
-    Exit status: 0 done, 2 bad input, 130 interrupted.
-    """
-    if opponent not in DEMONSTRATED:
-        raise ConfigError(f"--opponent is {opponent!r}; demonstrations are against {' or '.join(DEMONSTRATED)}")
-    check_ending(file, "--out", ".parquet")
-    if find_spec("pyarrow") is None:  # before the window opens: a person's play would be lost
-        raise ConfigError(f"Parquet files need pyarrow; {install_command('parquet')}")
-    warn(CHOOSING)
-    rules = o.RuleOptions(preset, max_time).given()
-    shielded: dict[str, Any] | None = {} if shield else None
-    spec = MatchSpec(preset, "options", opponent, 0, seed, side, shielded, rules=rules, judge="none")
-    match, demonstrator = Match(spec, "human", speed), Demonstrator(say=warn)
-    try:
-        match.seat(spec.own_team, demonstrator)
-        row = match.play(_until_closed).row
-    finally:
-        match.close()
-    about = {name: row[name] for name in ("preset", "opponent", "side", "seed", "captures", "captures_against")}
-    out().print(game_table(row, spec.radii_m))
-    make_folder(file.parent)
-    say(write_table(file.parent, [{**about, **one} for one in demonstrator.rows], file.stem))
 
 
 @command()

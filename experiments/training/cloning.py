@@ -14,7 +14,6 @@ from steerclear.env.mctf import MctfEnv
 from steerclear.policies import make
 from steerclear.policies.entrants.learned.cloned import OPTION_NAMES, Chooser, Teacher, write_chooser
 from steerclear.shield.exceptions import ConfigError
-from steerclear.shield.extras import install_command
 
 from .config import CloningOptions, Config
 from .env import core_of
@@ -24,20 +23,16 @@ HELD_OUT = 0.2
 
 
 class CloningTraining(Training):
-    """Demonstrations of the scripted demonstrator (or of people, from Parquet), and a network that chooses as it does.
-
-    Where no demonstrations are given, ``games`` are played. It takes seconds, so that nothing is resumed.
-    """
+    """Games of the scripted demonstrator, and a network that chooses as it does; seconds, so nothing is resumed."""
 
     def __init__(self, config: Config, folder: Path, resume: bool = False) -> None:
         super().__init__(config, folder)
         self.total = config.games
 
     def run(self, notice: Notice = lambda done, words: None) -> None:
-        """Play or read, learn, write."""
-        source = self.config.options.demonstrations
-        rows = _read(Path(source)) if source else self._played(notice)
-        about = {"demonstrations": "people" if source else "scripted demonstrator", "rows": len(rows)}
+        """Play, learn, write."""
+        rows = self._played(notice)
+        about = {"demonstrations": "scripted demonstrator", "rows": len(rows)}
         chooser, curve = fitted(rows, self.config.options, self.config.seed, about)
         write_chooser(chooser, self.folder / FINAL)
         write_chooser(chooser, self.folder / BEST)
@@ -70,34 +65,19 @@ def demonstrated(config: Config, opponent: str, seed: int) -> list[dict[str, Any
     return teacher.rows
 
 
-def _read(path: Path) -> list[dict[str, Any]]:
-    """Rows of a file of ``steerclear demonstrate``."""
-    try:
-        import pyarrow.parquet as parquet
-    except ModuleNotFoundError as error:
-        raise ConfigError(f"Parquet files need pyarrow; {install_command('parquet')}") from error
-    try:
-        return parquet.read_table(path).to_pylist()
-    except (OSError, ValueError) as error:
-        raise ConfigError(f"cannot read demonstrations from {path} ({error}); give a file of demonstrate") from error
-
-
 def fitted(
     rows: list[dict[str, Any]], options: CloningOptions, seed: int, card: dict[str, Any]
 ) -> tuple[Chooser, list[dict[str, Any]]]:
     """A chooser fitted to rows, and its curve: cross-entropy with Adam, a fifth of the rows held out."""
-    try:
-        names = Chooser.columns(rows[0])
-        seen = np.array([[float(row[name]) for name in names] for row in rows])
-        chosen = np.array([OPTION_NAMES.index(row["option"]) for row in rows])
-    except (IndexError, KeyError, ValueError, TypeError) as error:
-        raise ConfigError(f"the demonstrations hold no choices ({error}); record some with demonstrate") from error
+    names = Chooser.columns(rows[0]) if rows else ()
+    seen = np.array([[float(row[name]) for name in names] for row in rows])
+    chosen = np.array([OPTION_NAMES.index(row["option"]) for row in rows])
     rng = np.random.default_rng(seed)
     order = rng.permutation(len(rows))
     held = order[: max(1, int(HELD_OUT * len(rows)))]
     learned = order[len(held) :]
     if len(learned) < 10:
-        raise ConfigError(f"{len(rows)} choices are too few; record 20 at least")
+        raise ConfigError(f"{len(rows)} choices are too few; give more games")
     chooser = Chooser.fresh(names, options.hidden, rng, card)
     chooser.scale_to(seen[learned])
     curve, optimiser = [], _Adam(chooser.parameters(), options.rate)

@@ -153,9 +153,8 @@ class TwoPartOptions(QmixOptions):
 
 
 class CloningOptions(Part):
-    """A file of ``steerclear demonstrate`` (empty: games of the scripted demonstrator), and how it is learned from."""
+    """How the scripted demonstrator's games are learned from."""
 
-    demonstrations: str = ""
     epochs: Annotated[int, Field(ge=1, le=10**6)] = 200
     rate: Rate = 3e-3
     hidden: Width = 64

@@ -2,7 +2,7 @@
 
 The paper: the entry learned to choose among attack, flank, avoid, retreat, guard, tag and no-op. Here they are options
 (Sutton, Precup and Singh 1999): each says when it may begin, what it does, and when it ends. What a learner chooses
-with is its own affair; `OptionsTeam` plays given ones, and a person chooses in ``steerclear demonstrate``.
+with is its own affair; `OptionsTeam` plays given ones.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from steerclear.shield.exceptions import PolicyError
 
@@ -27,6 +28,8 @@ EVERY_S = 1.0
 """Time between looks, s."""
 AVOID_M = 16.0
 EDGE_M = 4.0
+SHOWN = ("x", "y", "heading", "speed", "tagged", "carries", "on_side", "recharged")
+"""What a choice may depend on of each boat."""
 
 
 @dataclass(frozen=True)
@@ -131,7 +134,7 @@ OPTIONS = {
     "tag": _while(_can_tag, tag),
     "no_op": _while(lambda sight, number: True, lambda sight, number: (STOP_MPS, sight.own[number].heading)),
 }
-"""By name, in the order of the keys 1 to 7 of ``steerclear demonstrate``."""
+"""By name."""
 
 
 def check_option(name: str) -> str:
@@ -158,6 +161,21 @@ def next_option(sight: Sight, number: int, wish: str) -> str:
     if sight.own[number].carries:
         return "retreat"
     return next((name for name in (wish, "guard") if OPTIONS[name].begins(sight, number)), "no_op")
+
+
+def row_of(sight: Sight, number: int, choice: Choice) -> dict[str, Any]:
+    """One boat at one moment: the option it follows, and the sight it was chosen at, in the own-end frame.
+
+    Returns:
+        ``time_s``, ``boat``, ``option``, ``since_s``, ``own_*`` of the boat itself, ``mate{k}_*`` and ``foe{k}_*`` of
+        the others, ``goal_x``, ``goal_y`` m, ``flag_taken``.
+    """
+    mates = [boat for k, boat in enumerate(sight.own) if k != number]
+    boats = {"own": sight.own[number], **{f"mate{k}": mate for k, mate in enumerate(mates)}}
+    boats |= {f"foe{k}": foe for k, foe in enumerate(sight.foes)}
+    row: dict[str, Any] = {"time_s": sight.time, "boat": number, "option": choice.option, "since_s": choice.since_s}
+    row |= {f"{who}_{name}": getattr(boat, name) for who, boat in boats.items() for name in SHOWN}
+    return row | {"goal_x": sight.goal[0], "goal_y": sight.goal[1], "flag_taken": sight.taken}
 
 
 class OptionPlayer(EntrantTeam):

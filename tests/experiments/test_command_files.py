@@ -173,7 +173,6 @@ TAKEN = [
     ("reach solve --own heron --other heron --out mine.npz", "mine.npz", THERE.format("--out")),
     ("reach show --own heron --other heron --picture mine.png", "mine.png", THERE.format("--picture")),
     ("sim-boats --demo --record mine.npz", "mine.npz", THERE.format("--record")),
-    ("demonstrate --out mine.parquet", "mine.parquet", THERE.format("--out")),
     ("platform new mine", "mine.yaml", THERE.format("--out")),
     ("ablate --json mine.json", "mine.json", THERE.format("--json")),
     ("entry check none.zip --json mine.json", "mine.json", THERE.format("--json")),

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from steerclear.env.whole_file import whole_file
 from steerclear.shield.exceptions import PolicyError
 
-from ..demonstrator import row_of
-from ..options import OPTIONS, OptionPlayer, target
+from ..options import OPTIONS, OptionPlayer, row_of, target
 from ..plane import distance
 from ..sight import Boat, Sight
 from .network import UNREADABLE
@@ -137,7 +136,7 @@ class Cloned(OptionPlayer):
 
     def wish(self, sight: Sight, number: int) -> str:
         """What the demonstrator would most likely choose."""
-        row = row_of(sight, number, self._choices[number], False)
+        row = row_of(sight, number, self._choices[number])
         seen = [[float(row[name]) for name in self._chooser.names]]
         return OPTION_NAMES[int(self._chooser.choices(seen)[0])]
 
@@ -148,7 +147,7 @@ class Teacher(OptionPlayer):
     Boat by boat: home with the flag, tag an intruder that comes near, else flank or attack.
 
     Attributes:
-        rows: what it chose at what sight, see `demonstrator.row_of`.
+        rows: what it chose at what sight, see `options.row_of`.
     """
 
     name = "teacher"
@@ -160,7 +159,7 @@ class Teacher(OptionPlayer):
     def look_round(self, sight: Sight) -> None:
         """Choose, and keep what was chosen."""
         super().look_round(sight)
-        self.rows += [row_of(sight, number, choice, True) for number, choice in enumerate(self._choices)]
+        self.rows += [row_of(sight, number, choice) for number, choice in enumerate(self._choices)]
 
     def wish(self, sight: Sight, number: int) -> str:
         """See the class."""

@@ -47,7 +47,6 @@ TEAMS = sorted((ROOT / "policies" / "entrants" / "learned" / "teams").glob("*.ya
         ({"algorithm": "qmix+ppo", "options": {"foo": 1}}, "unknown key 'options.foo'"),
         ({"algorithm": "cloning", "decisions": 3}, "algorithm cloning has no use for decisions; leave it out"),
         ({"algorithm": "cloning", "options": {"epochs": -1}}, "options.epochs is '-1'"),
-        ({"algorithm": "cloning", "options": {"demonstrations": 3}}, "options.demonstrations is '3'"),
         ({"algorithm": "raids", "shield_every": 10}, "algorithm raids has no use for shield_every"),
         ({"algorithm": "raids", "ppo": {"value": 1.0}}, "algorithm raids has no use for ppo.value"),
         ({"algorithm": "raids", "stages": [{"net": 1.0}]}, "algorithm raids has no use for stages.net"),
