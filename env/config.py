@@ -36,9 +36,7 @@ LONGEST_S = 1e7
 _YES_OR_NO = ("tag_on_oob", "tag_on_collision", "default_start", "on_side_start", "shows_disabled")
 _COUNTS = {"team_size": MOST_BOATS, "max_score": None, "decision_steps": MOST_STEPS}
 _CHOICES: dict[str, tuple[Any, ...]] = {
-    **dict.fromkeys(
-        ("tag_on_oob", "tag_on_collision", "default_start", "on_side_start", "shows_disabled"), (True, False)
-    ),
+    **dict.fromkeys(_YES_OR_NO, (True, False)),
     "capture_at": CAPTURE_AT,
     "untag_at": UNTAG_AT,
 }

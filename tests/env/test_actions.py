@@ -50,22 +50,6 @@ def test_a_declared_field_point_space_understands_numbers():
         wanted(env, agent_0=45)
 
 
-@pytest.mark.parametrize(
-    ("action", "message"),
-    [
-        (17, "action 17 of agent_0 is out of range; give a whole number 0..16"),
-        (None, "not usable; give a whole number"),
-        ((float("nan"), 0.0), "not finite"),
-        ("SCC", "unknown field point 'SCC'; did you mean"),
-    ],
-)
-def test_unusable_actions_name_the_boat_and_the_remedy(env, action, message):
-    before = env.core.state.copy()
-    with pytest.raises(GameError, match=message):
-        env.step({"agent_0": action})
-    np.testing.assert_array_equal(env.core.state, before)
-
-
 def test_kinds_are_given_once_per_boat_or_by_name():
     config = GameConfig(team_size=1)
     assert action_kinds(config, ["afp", "discrete"]) == {"agent_0": "afp", "agent_1": "discrete"}

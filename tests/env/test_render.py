@@ -63,23 +63,6 @@ def test_live_frames_need_no_display_and_show_the_game(game):
     assert dict(os.environ) == environment
 
 
-@pytest.mark.usefixtures("no_display")
-def test_the_env_draws(game):
-    env = MctfEnv(game.config, render_mode="rgb_array")
-    env.reset(seed=1)
-    first = env.render()
-    advance(env)
-    second = env.render()
-    assert first.shape == second.shape
-    assert np.any(first != second)
-    env.close()
-
-
-def test_the_same_moment_gives_the_same_picture(game):
-    frames = [Renderer(game.config, width_px=WIDTH_PX).draw(game.view()) for _ in range(2)]
-    np.testing.assert_array_equal(*frames)
-
-
 def test_boats_are_drawn_where_they_are_in_their_colours(game_record):
     arena = Arena.from_meta(read_meta(game_record))
     scene = Scene.from_record(game_record, 5, arena.dt_s)
@@ -89,22 +72,6 @@ def test_boats_are_drawn_where_they_are_in_their_colours(game_record):
         x, y = picture._canvas.to_px(centre)
         around = image[round(y) - 8 : round(y) + 9, round(x) - 8 : round(x) + 9]
         assert share_of(around, THEMES["light"].team[arena.team[boat]]) > 0.1
-
-
-def test_moving_a_boat_changes_its_two_places_only(game_record):
-    arena = Arena.from_meta({**read_meta(game_record), "shielded": []})
-    here = Scene.from_record(game_record, 0, arena.dt_s)
-    moved = here.position_m.copy()
-    moved[3] += (6.0, 4.0)
-    there = Scene(**{**vars(here), "position_m": moved})
-    picture = Picture(arena, 1280)
-    changed = np.any(pixels(picture.draw(here)) != pixels(picture.draw(there)), axis=-1)
-    rows, columns = np.nonzero(changed)
-    x, y = picture._canvas.to_px(moved[3])
-    assert changed.any()
-    assert columns.min() > x - 6 * 15.4 - 160
-    assert columns.max() < x + 160
-    assert rows.min() > y - 160
 
 
 def test_a_changed_command_shows_in_its_own_colour(game_record):
@@ -138,12 +105,6 @@ def test_every_mark_changes_the_picture(game_record, name):
 def test_a_command_that_is_not_finite_is_left_out(game_record):
     drawn(game_record, 31)
     assert np.isnan(game_record["wanted"][31, 1]).all()
-
-
-def test_commands_can_be_switched_off(game_record):
-    arena = Arena.from_meta(read_meta(game_record))
-    picture, scene = Picture(arena, WIDTH_PX), Scene.from_record(game_record, 5, arena.dt_s)
-    assert np.any(pixels(picture.draw(scene)) != pixels(picture.draw(scene, show_commands=False)))
 
 
 def test_a_live_overlay_is_drawn(game):
@@ -202,10 +163,6 @@ def test_obstacles_and_a_slanted_line_between_the_halves_are_drawn(game_record):
     top, bottom = slanted[80], slanted[-60]
     blue = THEMES["light"].water[0]
     assert share_of(top, blue) > share_of(bottom, blue) + 0.1
-
-
-def test_dark_is_darker(game_record):
-    assert drawn(game_record, 0, "dark").mean() < 0.5 * drawn(game_record, 0).mean()
 
 
 @pytest.mark.parametrize("bounds", [(160.0, 80.0), (30.0, 60.0)])

@@ -11,8 +11,7 @@ from steerclear.shield.platforms import layout as L
 ISLANDS = {"circle": [(3.0, (25.0, 12.0)), (3.0, (55.0, 28.0))]}
 
 
-@pytest.mark.parametrize("platform", ["heron", "surveyor", "si"])
-@pytest.mark.parametrize("obstacles", [None, ISLANDS])
+@pytest.mark.parametrize(("platform", "obstacles"), [("heron", ISLANDS), ("surveyor", None), ("si", ISLANDS)])
 @settings(derandomize=True, deadline=None, max_examples=6)
 @given(seed=st.integers(0, 10_000))
 def test_swapped_teams_play_the_turned_game(platform, obstacles, seed):

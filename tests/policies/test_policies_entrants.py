@@ -11,9 +11,8 @@ from steerclear import policies
 from steerclear.env.config import PRESETS
 from steerclear.env.mctf import MctfEnv
 from steerclear.policies.entrants import catalogue, plane
-from steerclear.policies.entrants.chao import GridProblem, search, way_home
+from steerclear.policies.entrants.chao import GridProblem, search
 from steerclear.policies.entrants.lucas import home_of
-from steerclear.policies.entrants.options import OPTIONS
 from steerclear.policies.entrants.plane import row
 from steerclear.policies.entrants.play import EntrantTeam
 from steerclear.policies.entrants.sight import Boat, look
@@ -109,12 +108,6 @@ def held_until(time_s, preset, init):
     return env
 
 
-def test_a_crossing_mate_of_meo_is_turned_round():
-    boats = [Boat(10.0, y, 0.0, 0.0, 2.0, 1.0, False, False, True, True) for y in (10.0, 20.0)]
-    assert plane.cross(boats[0].at, (30.0, 20.0), boats[1].at, (30.0, 10.0))
-    assert not plane.cross(boats[0].at, (30.0, 10.0), boats[1].at, (30.0, 20.0))
-
-
 @given(st.floats(-50, 50), st.floats(-50, 50), st.floats(0, 6.3), st.floats(0, 1.9))
 @settings(max_examples=60, deadline=None)
 def test_a_meeting_point_is_reached_at_the_same_moment_by_both(x, y, heading, speed):
@@ -145,30 +138,6 @@ def test_a_way_leads_over_the_flag_and_home_through_open_cells():
             assert FLAG & set(way)
             assert way[-1][0] < problem.own
     assert found > 5
-
-
-def test_where_the_flag_is_shut_in_there_is_no_way_but_one_home():
-    ring = frozenset((c, r) for c in range(11, 15) for r in range(2, 6)) - FLAG
-    problem = GridProblem(
-        (10, 3), False, FLAG - {(12, 3)} - {(12, 4)}, 8, frozenset(), ring | {(12, 3), (12, 4), (15, 3)}
-    )
-    shut = GridProblem(
-        (10, 3), False, frozenset({(13, 3)}), 8, frozenset(), frozenset({(12, 3), (14, 3), (13, 2), (13, 4)})
-    )
-    assert search(shut) is None
-    assert len(way_home(problem)) == 3
-
-
-def test_options_begin_and_end_where_they_say():
-    env = MctfEnv("aamas2024")
-    env.reset(seed=1)
-    sight = look(env.core, 0)
-    assert OPTIONS["attack"].begins(sight, 0)
-    assert not OPTIONS["tag"].begins(sight, 0)  # nobody has crossed the line
-    for option in OPTIONS.values():
-        speed, heading = option.steer(sight, 0)
-        assert 0.0 <= speed <= sight.own[0].top
-        assert math.isfinite(heading)
 
 
 @pytest.mark.parametrize(

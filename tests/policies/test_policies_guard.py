@@ -164,7 +164,7 @@ def test_an_error_names_their_line_before_ours_or_a_librarys(body, place):
 
 
 def test_every_kind_of_failure_is_told_apart_and_dated(game):
-    answers = iter([4, None, 4, (np.nan, 0.0), 99, "nowhere", None, SystemExit(3)])
+    answers = iter([4, None, 4, (np.nan, 0.0), 99, "nowhere", None, SystemExit(3), (1e9, 0.0), ZeroDivisionError()])
 
     def answer(observation):
         given = next(answers)
@@ -173,11 +173,12 @@ def test_every_kind_of_failure_is_told_apart_and_dated(game):
         return given
 
     team = policies.from_callable(answer)
-    actions = run(team, game, steps=8, own=["agent_0"])
-    assert [action["agent_0"] for action in actions] == [4, policies.HOLD, 4, *[policies.HOLD] * 5]
+    actions = run(team, game, steps=10, own=["agent_0"])
+    assert [action["agent_0"] for action in actions] == [4, policies.HOLD, 4, *[policies.HOLD] * 7]
     found = [(failure.kind, failure.step, failure.count) for failure in team.report().failures]
-    assert found == [("no answer", 1, 2), ("not finite", 3, 1), ("no action", 4, 2), ("raised SystemExit", 7, 1)]
-    assert team.report().held == 6
+    assert found[:3] == [("no answer", 1, 2), ("not finite", 3, 1), ("no action", 4, 2)]
+    assert found[3:] == [("raised SystemExit", 7, 1), ("too large", 8, 1), ("raised ZeroDivisionError", 9, 1)]
+    assert team.report().held == 8
 
 
 def test_ctrl_c_is_not_swallowed(game):

@@ -94,7 +94,7 @@ def turned(core, other):
     other.flag_position[:] = np.array(core.config.env_bounds_m) - core.flag_position[:, ::-1]
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), preset=st.sampled_from(PRESETS))
 @pytest.mark.parametrize("name", MIRRORED)
 def test_red_plays_as_blue_would_on_the_turned_field(name, seed, preset):
@@ -145,7 +145,9 @@ def test_attackers_capture_from_an_idle_team(name, preset, side):
     for _ in range(3000):
         actions[:, 3 * side : 3 * side + 3] = team.act(core, side)
         core.step(actions)
-    assert core.captures[0, side] >= 1
+        if core.captures[0, side]:
+            break
+    assert core.captures[0, side]
 
 
 @pytest.mark.parametrize("name", ["medium_defend", "hard_defend"])

@@ -74,8 +74,7 @@ def chase(preset, place, course, steps, side=0, **options):
 
 
 @pytest.mark.parametrize("preset", ["aamas2024", "mctf2025"])
-@pytest.mark.parametrize("side", [0, 1])
-@pytest.mark.parametrize("place", [(0.3, 0.2), (0.7, 0.8), (0.9, 0.5), (0.5, 0.9)])
+@pytest.mark.parametrize(("side", "place"), [(0, (0.3, 0.2)), (1, (0.7, 0.8)), (0, (0.9, 0.5)), (1, (0.5, 0.9))])
 def test_hits_a_stationary_boat(preset, side, place):
     assert chase(preset, place, (0.0, 0.0), steps=900, side=side) < 1.5
 

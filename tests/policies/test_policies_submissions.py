@@ -181,46 +181,6 @@ def test_the_seed_decides_a_submissions_random_numbers(game, write_entry, load):
     assert first != other
 
 
-MOODY = """
-    import sys
-    class solution:
-        def __init__(self):
-            self.step = -1
-        def compute_action(self, agent_id, full_obs_normalized, full_obs, global_state):
-            if agent_id == "agent_0":
-                self.step += 1
-            if agent_id == "agent_2":
-                return 4
-            if self.step == 8:
-                return 1 / 0
-            if self.step == 9:
-                sys.exit(1)
-            nan = float("nan")
-            return [4, None, nan, (nan, 1.0), (1, 2, 3), 99, (1e9, 0.0), "XYZ", 4, 4, 4][self.step]
-"""
-
-
-def test_a_submission_that_fails_mid_game_holds_and_the_game_goes_on(game, write_entry, load):
-    team = load(write_entry(MOODY, name="moody"))
-    actions = play(team, game, steps=11)
-    for step, action in enumerate(actions):
-        good = step in (0, 10)
-        assert action["agent_2"] == 4
-        assert action["agent_0"] == action["agent_1"] == (4 if good else policies.HOLD), step
-    report = team.report()
-    assert report.policy == "moody"
-    assert report.held == 18
-    assert {failure.kind: (failure.step, failure.count) for failure in report.failures} == {
-        "no answer": (1, 2),
-        "not finite": (2, 4),
-        "no action": (4, 6),
-        "too large": (6, 2),
-        "raised ZeroDivisionError": (8, 2),
-        "raised SystemExit": (9, 2),
-    }
-    assert {failure.agent_id for failure in report.failures} == {"agent_0"}
-
-
 @pytest.mark.parametrize(
     ("solution", "message"),
     [

@@ -82,18 +82,6 @@ def test_a_side_once_taken_is_kept():
     assert (np.diff(east) >= -1e-6).all() or (np.diff(east) <= 1e-6).all() or np.ptp(np.sign(np.round(east, 2))) <= 1
 
 
-@pytest.mark.parametrize("settings", [{}, {"margin_cap_m": 50.0}])
-def test_one_boat_alone_stays_in_the_field(settings):
-    fleet = fleet_of([(20, 5, 0, 2)], [0])
-    run = sail(
-        Shield(surroundings=Surroundings(field=(0, 0, 40, 40)), **settings),
-        fleet,
-        lambda step, state: [[2.0, 0.0]],
-        400,
-    )
-    assert 20 < run.position[:, 0, 1].max() < 40
-
-
 @pytest.mark.parametrize("start_y", [18.2, 18.5])
 def test_a_boat_that_cannot_keep_off_a_wall_any_more_turns_away_from_it(start_y):
     """A hull's width is lost for a moment, the wall itself is not touched, and the boat stays on its side."""
@@ -189,16 +177,3 @@ def test_boats_keep_apart_when_the_solver_fails(solver, monkeypatch):
     run = sail(Shield(), fleet, lambda step, state: np.array([[2.0, 0.0], [2.0, 0.0]]), 100)
     assert distances(run.position)[:, 0, 1].min() >= 2.5
     assert np.isfinite(run.sent).all()
-
-
-def test_the_batch_decides_as_the_single_shield():
-    state = starts("heron", 4, 12, 9)
-    random = wander("heron", 4, 10)
-    commands = [random(step, state) for step in range(80)]
-    team = [0, 0, 1, 1]
-    batch = sail_games(ShieldConfig(), state.copy(), ["heron"] * 4, team, lambda step, now: commands[step], 80)
-    for game in range(4):
-        fleet = fleet_of(state[game][:, [L.X, L.Y, L.HEADING, L.SPEED]], team, thrust=state[game][:, L.THRUST])
-        one = sail(Shield(), fleet, lambda step, now, game=game: commands[step][game], 80)
-        np.testing.assert_allclose(one.position, batch.position[:, game], atol=1e-6)
-        assert (one.reason == batch.reason[:, game]).mean() > 0.99

@@ -83,6 +83,8 @@ def test_threads_share_the_games_of_a_batch_and_another_goes_on_from_what_it_rem
 def test_no_number_of_threads_is_refused(threads):
     with pytest.raises(ConfigError, match=r"threads is .*; give a whole number >= 1"):
         BatchedShield(ShieldConfig(), 2, ("heron",) * 5, TEAM, threads=threads)
+    with pytest.raises(ConfigError, match="coordination='team'"):
+        BatchedShield(ShieldConfig(coordination="per_boat"), 1, ("heron",), (0,))
 
 
 def test_boats_that_are_not_ours_decide_nothing_and_are_feared_alike():

@@ -12,12 +12,12 @@ from steerclear.shield.tracks import steps_of_delay
 STEPS = 3
 
 
-def sail_late(shield_of, fleet, steps, believed_steps=STEPS):
+def sail_late(fleet, steps, believed_steps=STEPS):
     """Head-on run in which every command takes effect ``STEPS`` steps late; returns distances and sent commands."""
     params, state = packed(fleet.platforms), fleet.state.copy()
     fill(state, params)
     config = ShieldConfig(delay_s=0.1 * believed_steps, track_error_mps=0.0)
-    decide = shield_of(config, fleet)
+    decide = batch(config, fleet)
     queue = [np.column_stack([state[:, L.SPEED], state[:, L.HEADING]]) for _ in range(STEPS)]
     distance, sent = [], []
     for _ in range(steps):
@@ -32,16 +32,6 @@ def sail_late(shield_of, fleet, steps, believed_steps=STEPS):
     return np.array(distance), np.array(sent)
 
 
-def single(config, fleet):
-    shield = Shield(config)
-
-    def decide(state, wanted):
-        now = Fleet(state, fleet.team, fleet.platforms, fleet.controlled, fleet.names)
-        return shield.decide(now, Commands.relative_deg(wanted)).filtered.values
-
-    return decide
-
-
 def batch(config, fleet):
     shield = BatchedShield(config, 1, fleet.platforms, tuple(fleet.team))
     return lambda state, wanted: shield.decide(state[None], wanted[None], fleet.controlled[None])[0]
@@ -50,30 +40,21 @@ def batch(config, fleet):
 @pytest.mark.parametrize("platforms", ["heron", "surveyor"])
 def test_the_distance_is_kept_when_the_delay_is_known(platforms):
     fleet = head_on(gap_m=60.0, platforms=platforms, aside_m=0.5)
-    distance, sent = sail_late(batch, fleet, 300)
+    distance, sent = sail_late(fleet, 300)
     assert distance.min() >= 2.5
     assert (sent[:, 0, 1] != 0.0).any()
 
 
 def test_a_delay_kept_from_the_shield_costs_distance():
     fleet = head_on(gap_m=60.0, aside_m=0.5)
-    known, _ = sail_late(batch, fleet, 300)
-    unknown, _ = sail_late(batch, fleet, 300, believed_steps=0)
+    known, _ = sail_late(fleet, 300)
+    unknown, _ = sail_late(fleet, 300, believed_steps=0)
     assert unknown.min() < known.min()
 
 
-def test_a_batch_decides_as_a_single_shield_does():
-    fleet = head_on(gap_m=30.0, aside_m=0.5)
-    one_distance, one_sent = sail_late(single, fleet, 120)
-    many_distance, many_sent = sail_late(batch, fleet, 120)
-    assert np.allclose(one_distance, many_distance, atol=1e-6)
-    assert np.allclose(one_sent, many_sent, atol=1e-5)
-
-
-@pytest.mark.parametrize("shield_of", [single, batch])
-def test_safe_commands_pass_bit_for_bit(shield_of):
+def test_safe_commands_pass_bit_for_bit():
     fleet = head_on(gap_m=300.0)
-    decide = shield_of(ShieldConfig(delay_s=0.3), fleet)
+    decide = batch(ShieldConfig(delay_s=0.3), fleet)
     state = fleet.state.copy()
     fill(state, packed(fleet.platforms))
     random = np.random.default_rng(0)

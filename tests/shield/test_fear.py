@@ -4,10 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from shield_loops import scattered
 from shield_scenes import fleet_of, relative
 from steerclear.shield import Shield, ShieldConfig
-from steerclear.shield.batch import BatchedShield
 from steerclear.shield.exceptions import FleetError
 from steerclear.shield.fleet import Fleet
 from steerclear.shield.platforms import layout as L
@@ -84,22 +82,3 @@ def test_what_cannot_be_is_refused(more):
         Fleet.of(
             position_m=[[0, 0], [9, 9]], heading_deg=[0, 0], speed_mps=[1, 1], team=[0, 1], platforms="heron", **more
         )
-
-
-def test_a_batch_fears_as_single_decisions_do():
-    random, count = np.random.default_rng(3), 40
-    platforms, team = ("surveyor",) * 3, (0, 1, 1)
-    states = scattered(random, count, list(platforms), 30.0, gap_m=6.0)
-    wanted = np.zeros((count, 3, 2))
-    wanted[..., 0], wanted[..., 1] = 3.0, random.uniform(-90.0, 90.0, (count, 3))
-    ours = np.broadcast_to(np.array([True, False, False]), (count, 3)).copy()
-    visiting = random.uniform(size=(count, 3)) < 0.5
-    guard = BatchedShield(ShieldConfig(), count, platforms, team)
-    sent = guard.decide(states, wanted, ours, visiting).copy()
-    for b in range(count):
-        fleet = Fleet(states[b], np.array(team), platforms, ours[b], ("a", "b", "c"), visiting=visiting[b])
-        one = Shield().decide(fleet, relative(*wanted[b]))
-        np.testing.assert_allclose(one.safety_margin_m, guard.safety_margin_m[b], atol=1e-6)
-        np.testing.assert_allclose(one.filtered.values, sent[b], atol=1e-6)
-    plain = BatchedShield(ShieldConfig(), count, platforms, team).decide(states, wanted, ours)
-    assert (plain != sent).any(), "else visiting changes nothing"

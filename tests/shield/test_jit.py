@@ -61,14 +61,14 @@ def test_what_a_changed_callee_does_is_seen(call):
     assert call(inner="5.0 * x")[0] == 30.0
 
 
-@pytest.mark.parametrize("damage", [lambda content: b"", lambda content: content[:100], lambda content: content[:-1]])
-def test_a_damaged_file_is_told_and_made_anew(call, tmp_path, damage):
+def test_a_damaged_file_is_told_and_made_anew(call, tmp_path):
     call()
     (kept,) = (tmp_path / "kept").iterdir()
-    kept.write_bytes(damage(kept.read_bytes()))
-    value, said = call()
-    assert value == 12.0
-    assert len(said.strip().splitlines()) == 1
+    for left in (0, 100, -1):
+        kept.write_bytes(kept.read_bytes()[:left])
+        value, said = call()
+        assert value == 12.0
+        assert len(said.strip().splitlines()) == 1
     assert call() == (12.0, "")
 
 

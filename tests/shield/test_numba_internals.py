@@ -6,9 +6,6 @@ import sys
 
 import pytest
 from numba import njit, types
-from numba.core import config, dispatcher, imputils, registry
-from numba.core.registry import cpu_target
-from numba.core.typing import templates
 from steerclear.shield import jit, whole_program
 from steerclear.shield.jit import kernel, lean_kernel
 
@@ -86,19 +83,3 @@ def test_a_kernel_is_called_by_functions_that_numba_compiles_itself():
 
 def test_lean_kernels_are_compiled_without_counting():
     assert lean_kernel(lambda x: x).targetoptions["_nrt"] is False
-
-
-def test_a_callee_is_compiled_once_whatever_constants_it_is_called_with():
-    inner = lean_kernel(lambda x, k, deep: x + k if deep else x - k)
-    outer = kernel(lambda x: inner(x, 1, True) + inner(x, 2, deep=False))
-    outer._part((types.float64,))
-    assert len(inner._parts) == 1
-    assert outer(1.5) == 2.0
-
-
-def test_targets_templates_and_folders_are_where_they_were():
-    assert cpu_target.typing_context is not None
-    assert issubclass(registry.CPUDispatcher, dispatcher.Dispatcher)
-    assert callable(templates.infer_getattr)
-    assert callable(imputils.lower_getattr_generic)
-    assert hasattr(config, "CACHE_DIR")

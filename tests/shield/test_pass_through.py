@@ -5,8 +5,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from shield_scenes import bits, finite_commands, fleet_of, fleets, head_on, quick, relative
-from steerclear.shield import Commands, Fleet, Reason, Shield, ShieldConfig
-from steerclear.shield.batch import BatchedShield
+from steerclear.shield import Commands, Fleet, Reason, Shield
 
 ODD = [0.0, -0.0, 5e-324, -5e-324, 1e-310, 1.0 + 2**-52, 179.99999999999997, -180.0, 180.0, 359.0]
 
@@ -107,12 +106,6 @@ def test_a_change_is_made_in_the_frame_of_the_wanted_command(coordination):
         assert getattr(turned[0], field) == pytest.approx(getattr(absolute[0], field), abs=1e-9)
 
 
-def test_a_step_of_the_class_k_rate_is_no_excuse_to_touch_a_far_boat():
-    """A finite response rate asks margins to shrink slowly; margins above the cap are left alone."""
-    decisions = Shield(cbf_rate_per_s=0.5).decide(far_apart(), relative((2.0, 0.0), (2.0, 0.0), (0.0, 0.0)))
-    assert not decisions.intervened.any()
-
-
 @pytest.mark.parametrize(("gap_m", "speed_mps"), [(9.0, 2.0), (20.0, 8.0), (30.0, 20.0), (9.0, 49.0)])
 @pytest.mark.parametrize("platform", ["heron", "surveyor"])
 def test_an_opponent_that_comes_astern_is_one_that_comes(platform, gap_m, speed_mps):
@@ -126,14 +119,3 @@ def test_an_opponent_that_comes_astern_is_one_that_comes(platform, gap_m, speed_
     assert ahead[0].safety_margin_m < 0.2
     np.testing.assert_allclose(ahead.filtered.values, astern.filtered.values, atol=1e-9)
     assert ahead[0].safety_margin_m == pytest.approx(astern[0].safety_margin_m, abs=1e-9)
-
-
-@pytest.mark.parametrize(("gap_m", "speed_mps"), [(9.0, 2.0), (20.0, 8.0), (30.0, 20.0)])
-@pytest.mark.parametrize("platform", ["heron", "surveyor"])
-def test_in_a_batch_an_opponent_that_comes_astern_is_one_that_comes(platform, gap_m, speed_mps):
-    fleet = fleet_of([(0, 0, 0, 1.5), (0.3, gap_m, 0.0, -speed_mps)], [0, 1], platform, thrust=[80.0, 80.0])
-    wanted, batch = [(1.5, 0.0), (1.0, 9.0)], BatchedShield(ShieldConfig(), 1, (platform,) * 2, (0, 1))
-    sent = batch.decide(fleet.state[None], np.array(wanted)[None], np.array([[True, False]]))[0]
-    single = Shield().decide(fleet, relative(*wanted))
-    np.testing.assert_allclose(sent, single.filtered.values, atol=1e-6)
-    assert batch.safety_margin_m[0, 0] == pytest.approx(single[0].safety_margin_m, abs=1e-9)

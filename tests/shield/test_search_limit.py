@@ -75,23 +75,6 @@ def test_ordinary_decisions_do_not_come_near_the_limit():
     assert (runs[0].reason != Reason.PASSED).any()
 
 
-@pytest.mark.parametrize("limit", [LEAST, 2000.0])
-def test_a_batch_is_cut_short_as_single_decisions_are(limit):
-    platforms, team = ["heron"] * 6, [0, 0, 0, 1, 1, 1]
-    state = scattered(np.random.default_rng(4), 3, platforms, 16.0)
-    config = ShieldConfig(work_budget=limit)
-    run = sail_games(config, state.copy(), platforms, team, Wander(5, 3, platforms), 40)
-    for game in range(3):
-        wander = Wander(5, 3, platforms)
-        alone = sail(
-            Shield(config),
-            fleet_of_rows(state[game], team, "heron"),
-            lambda step, now, game=game, wander=wander: wander(step, np.repeat(now[None], 3, 0))[game],
-            40,
-        )
-        np.testing.assert_allclose(alone.sent, run.sent[:, game], atol=1e-6)
-
-
 @pytest.mark.parametrize("limit", [0.0, -1.0, 999.0, np.nan, "much", None])
 def test_a_limit_that_is_none_is_refused(limit):
     with pytest.raises(ConfigError, match="work_budget"):

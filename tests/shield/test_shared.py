@@ -222,9 +222,3 @@ def test_a_field_that_is_not_there_is_an_error():
         read_nothing(shared)
     with pytest.raises(AttributeError, match="nothing"):
         _ = shared.nothing
-
-
-@kernel
-def count_up(of):
-    """Write how often it was called into an array of a tuple."""
-    of.row[0] += 1.0

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from shield_loops import fill, packed, sail, sail_games, step_all
+from shield_loops import fill, packed, sail, step_all
 from shield_scenes import fleet_of
 from steerclear.shield import Commands, Fleet, Reason, Shield, ShieldConfig, Surroundings
 from steerclear.shield.platforms import get_platform
@@ -104,19 +104,6 @@ def test_of_a_command_changed_for_an_edge_the_edge_is_told():
         step_all(packed(fleet.platforms), state[None], decisions.filtered.values[None], 0.1)
     assert len(told) > 20
     assert set(told) == {("field",)}
-
-
-def test_batches_give_way_as_single_shields_do():
-    fleet = crossing("heron")
-    wanted = towards_goal("heron", lambda _: 0.0)
-    single = sail(Shield(), fleet, wanted, 200)
-    state = fleet.state[None].copy()
-    fill(state[0], packed(fleet.platforms))
-    games = sail_games(
-        ShieldConfig(), state, fleet.platforms, (0, 1), lambda step, now: wanted(step, now[0])[None], 200
-    )
-    np.testing.assert_array_equal(games.reason[:, 0, 0], single.reason[:, 0])
-    np.testing.assert_allclose(games.position[:, 0], single.position, atol=1e-6)
 
 
 def test_a_boat_that_is_handed_over_while_it_gives_way_holds_nobody_up():

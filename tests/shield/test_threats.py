@@ -37,20 +37,6 @@ def test_a_team_mate_close_by_does_not_hide_the_fear(platform, top, ahead_m):
     assert scene.target[0] == pytest.approx(decay * decisions.safety_margin_m[0])
 
 
-def test_each_opponent_that_is_looked_up_has_its_own():
-    rows = [(0, 0, 0, 3.0), (3.0, 34.0, 180, 3.0), (-20.0, -26.0, 0.0, 3.0)]
-    _, memory, scene = remembered(rows, [0, 1, 1], "surveyor")
-    least, other = sorted(memory[0, 1:])
-    assert 0.0 < least < other
-    assert scene.threat_target_m[0, 1] != scene.threat_target_m[0, 2]
-
-
-def test_of_boats_that_run_pursuers_through_the_least_counts_for_all():
-    rows = [(0, 0, 0, 2.0), (1.0, 10.0, 180, 2.0), (-9.0, -9.0, 45.0, 2.0)]
-    _, memory, _ = remembered(rows, [0, 1, 1], "heron")
-    assert memory[0, 1] == memory[0, 2] > 0.0
-
-
 @pytest.mark.parametrize("platform", ["surveyor", "heron"])
 def test_after_a_breach_nothing_is_asked_that_was_not_there(platform):
     rows = [(0, 0, 0, 1.0), (0, 2.3, 180, 1.0), (12.0, 12.0, 225.0, 1.0)]

@@ -101,22 +101,6 @@ def test_what_is_seen_is_the_same_from_both_sides_and_edges(config):
     np.testing.assert_allclose(upper, teams[1].seen(games)[2], atol=1e-6)
 
 
-def test_a_shape_is_asked_for_at_first_at_each_phase_and_after_some_seconds(config):
-    core = BatchedMctf(config, n_games=1, seed=1)
-    core.reset(seed=1)
-    team = RaidsBatch(network())
-    team.reset(core, 0, 1)
-    only = np.arange(1)
-    asked = []
-    for second in range(25):
-        core.time_s[:] = second
-        found = team.advance(only)
-        if found.size:
-            team.shape(found, np.zeros((1, len(NAMES))))
-            asked.append(second)
-    assert asked == [0, 10, 20]
-
-
 def test_a_team_whose_boats_are_all_tagged_waits(config):
     core = BatchedMctf(config, n_games=1, seed=1)
     core.reset(seed=1)

@@ -9,9 +9,9 @@ from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
 from steerclear.policies.entrants.sight import look
-from steerclear.policies.entrants.undertow.habits import LEAD, WARY, Habits, Watch
-from steerclear.policies.entrants.undertow.passage import WAKES_S, Waters, homeward, outward, slack_m
-from steerclear.policies.entrants.undertow.raid import Chart, Phase, Raid, off
+from steerclear.policies.entrants.undertow.habits import LEAD, WARY, Habits
+from steerclear.policies.entrants.undertow.passage import Waters, outward
+from steerclear.policies.entrants.undertow.raid import Phase, Raid
 from steerclear.policies.entrants.undertow.shape import SCRIPTED
 from steerclear.policies.entrants.undertow.team import aim_of
 from steerclear.shield.exceptions import PolicyError
@@ -95,15 +95,6 @@ def test_no_raid_begins_with_another_opponent_in_the_way_and_the_chart_is_turned
     assert not raid.upper
 
 
-def test_a_chart_is_the_other_one_mirrored_and_ways_are_kept_off_at_their_nearest_point(sight):
-    up, down = Chart(sight, True), Chart(sight, False)
-    for (x, y), (x_down, y_down) in zip(up.posts, down.posts, strict=True):
-        assert (x, sight.size[1] - y) == pytest.approx((x_down, y_down))
-    assert up.run((50.0, 26.0))[1] + down.run((50.0, 14.0))[1] == pytest.approx(sight.size[1])
-    assert off((5.0, 3.0), (0.0, 0.0), (10.0, 0.0)) == pytest.approx(3.0)
-    assert off((13.0, 4.0), (0.0, 0.0), (10.0, 0.0)) == pytest.approx(5.0)
-
-
 GUARD_AWAY, NOBODY_HOME = [*PLACES[:5], [75.0, 3.0]], [*APART[:2], [38.0, 6.0], [20.0, 38.0], [5.0, 38.0], [12.0, 38.0]]
 
 
@@ -128,17 +119,6 @@ def alone(sight):
     raid = Raid(here)
     raid.advance(here)
     return raid, here
-
-
-def test_the_slack_of_a_way_counts_reach_speed_and_the_way_round_by_the_base(sight):
-    here = moved(sight, 0.0, {2: {"x": 41.0, "y": 20.0}}, {n: {"x": 5.0, "on_side": False} for n in range(3)})
-    boat, grab, home = here.own[2], (62.0, 20.0), (39.5, 20.0)
-    met = slack_m(moved(here, 0.0, foes={0: {"x": 30.0, "y": 20.0}}), boat, grab, home)
-    last = 39.5 + 22.5 / 11  # the last point of the way on their side, at steps of 22.5 / 11 m
-    assert met == pytest.approx((last - 30.0) - here.reach - (62.0 - last))  # both sail as far from the grab on
-    at_home = moved(here, 0.0, foes={0: {"x": 60.0, "y": 20.0, "on_side": True}})
-    tagged = moved(here, 0.0, foes={0: {"x": 30.0, "y": 20.0, "tagged": True}})
-    assert slack_m(at_home, boat, grab, home) < met < slack_m(tagged, boat, grab, home)
 
 
 def test_once_every_opponent_has_come_the_third_boat_sails_alone_and_brings_the_flag_home(sight):
@@ -177,31 +157,6 @@ def test_the_third_boat_gives_up_tagged_or_cut_off(sight, own, foes):
     raid, here = alone(sight)
     raid.advance(moved(here, 1.0, own, foes))
     assert raid.phase == Phase.GATHER
-
-
-def test_guards_stand_between_the_flag_and_an_intruder_each_and_sail_at_them_once_the_third_is_near(sight):
-    raid, here = alone(sight)
-    near = moved(here, 1.0, {0: {"x": 20.0, "y": 28.0}, 1: {"x": 14.0, "y": 28.0}})
-    chart = raid.advance(near)
-    raid.phase = Phase.GATHER
-    points = [aim_of(raid, near, chart, number).point for number in (0, 1)]
-    for point, foe in zip(points, (near.foes[1], near.foes[0]), strict=True):
-        flag_to_point = point[0] - near.home[0], point[1] - near.home[1]
-        flag_to_foe = foe.x - near.home[0], foe.y - near.home[1]
-        assert flag_to_point[0] * flag_to_foe[1] == pytest.approx(flag_to_point[1] * flag_to_foe[0])
-        assert flag_to_point[0] ** 2 + flag_to_point[1] ** 2 == pytest.approx(SCRIPTED.guard_m**2)
-    assert aim_of(raid, near, chart, 2).point == pytest.approx((38.0, 6.0))
-    raid.phase, out = Phase.RUN, moved(near, 5.0, {2: {"x": 45.0, "y": 9.0}})
-    assert aim_of(raid, out, chart, 0).point == pytest.approx((20.0, 37.0))
-    assert aim_of(raid, out, chart, 2).point[0] > 60.0
-
-
-def test_all_meet_who_has_the_own_flag(sight):
-    raid, here = alone(sight)
-    taken = replace(moved(here, 1.0, foes={0: {"carries": True}}), taken=True, flag=(12.0, 38.0))
-    chart = raid.advance(taken)
-    assert raid.phase == Phase.GATHER
-    assert all(aim_of(raid, taken, chart, number).point[1] > 36.0 for number in range(3))
 
 
 def test_distances_of_a_raid_grow_with_the_field_times_do_not_and_it_needs_three_boats():
@@ -253,15 +208,6 @@ def test_who_leaves_its_circle_is_not_relied_on_for_long(sight):
     assert habits.settled(2)
 
 
-def test_a_tagged_boat_is_likened_to_tagged_ones_and_cannot_tag(sight):
-    def place(second):
-        phase = second % 14
-        return {"x": 45.0 + 2.0 * min(phase, 14 - phase), "y": 20.0, "heading": math.pi / 2.0, "tagged": phase < 7}
-
-    habits = watched(sight, 60, place)
-    assert habits.track(2, 20)[:, 2].tolist() == [1.0 - place(60 + k)["tagged"] for k in range(20)]
-
-
 class Known:
     """Habits that are what a test says: number to track."""
 
@@ -294,63 +240,6 @@ def test_a_way_leads_round_who_stands_and_to_the_flag(apart):
     assert math.dist(found.points[-1], apart.goal) < apart.reach
 
 
-def test_the_way_home_is_thought_of_before_a_boat_sets_out(apart):
-    """From 12 s on another opponent keeps the line: out is free, home is not."""
-    late = np.concatenate([standing(52.0, 20.0, 0.0)[:12], np.tile([43.0, 20.0, 1.0], (78, 1))])
-    wall = {n: np.where([[True, False, True]], late, y) for n, y in enumerate((8.0, 20.0, 32.0))}
-    assert outward(Waters(apart, Known(wall), 0.0, FAR_M), apart.own[2]).room_m < 0.0
-    open_to_all = {n: standing(43.0, 20.0, 0.0) for n in range(3)}
-    assert outward(Waters(apart, Known(open_to_all), 0.0, FAR_M), apart.own[2]).room_m == math.inf
-
-
-def test_a_patrol_is_passed_while_it_is_elsewhere(apart):
-    """It is in the way for 10 s and then not; whoever waits finds the way that was shut."""
-    comes, goes = standing(52.0, 20.0), standing(52.0, 20.0)
-    comes[10:], goes[:10] = [75.0, 20.0, 0.0], [75.0, 20.0, 0.0]
-    points = np.linspace((41.0, 20.0), (63.0, 20.0), 40)[None]
-    times_s = np.linspace(1.0, 12.0, 40)[None]
-    rooms = [
-        float(Waters(apart, Known({2: track}), 0.0, FAR_M).room_m(points, times_s + after_s, np.array([12.0]))[0])
-        for track, after_s in ((comes, 0.0), (comes, 15.0), (goes, 0.0))
-    ]
-    assert rooms[0] < 0.0 < rooms[1]
-    assert rooms[2] < 0.0
-
-
-def test_who_keeps_no_habit_is_held_to_cut_the_boat_off(apart):
-    boat, grab, home = apart.own[2], (61.0, 20.0), (39.0, 20.0)
-    points, times_s = sailed(boat, (grab, home))
-    grabs_s = math.dist(boat.at, grab) / boat.top
-    room = Waters(apart, Known({}), 0.0, 0.0).room_m(points[None], times_s[None], np.array([grabs_s]))
-    assert room[0] == pytest.approx(slack_m(apart, boat, grab, home), abs=1.0)
-
-
-def test_a_tagged_boat_that_is_soon_free_is_kept_clear_of(apart):
-    tagged = moved(apart, 0.0, foes={2: {"tagged": True, "x": 50.0, "y": 20.0}})
-    at, free_s = (60.0, 20.0), 5.0  # it is free again where its base is in reach
-    waters = Waters(tagged, Known({0: standing(75.0, 38.0), 1: standing(75.0, 2.0)}), 1.0, FAR_M)
-    for after_s, near in ((free_s, True), (free_s + 1.5 * WAKES_S, False)):
-        room = waters.room_m(np.array([[(at[0], at[1] + 8.0)]]), np.array([[after_s]]), np.array([99.0]))[0]
-        assert room == pytest.approx(8.0 - apart.reach - 1.0) if near else room > 0.0
-
-
-def test_home_is_over_the_line_by_the_freest_way(apart):
-    boat = moved(apart, 0.0, {2: {"x": 66.0, "y": 12.0, "carries": True, "on_side": False}}).own[2]
-    found = homeward(Waters(apart, Known({2: standing(52.0, 22.0)}), 2.0, FAR_M), boat)
-    assert found.room_m > 0.0
-    assert found.points[-1][0] < apart.line
-    assert found.points[-1][1] < 12.0
-
-
-@pytest.mark.parametrize(("lure_x", "unguarded"), [(30.0, True), (41.0, False)])
-def test_who_is_up_at_the_line_with_nobody_to_chase_is_no_guard(apart, lure_x, unguarded):
-    up = {number: {"x": 46.0} for number in range(3)}
-    watch = Watch(apart)
-    for second in range(20):
-        watch.look(moved(apart, float(second), {0: {"x": lure_x}, 2: {"x": 30.0}}, up))
-    assert watch.unguarded == unguarded
-
-
 def raid_with(sight, tracks):
     """A raid in which opponents with tracks keep a habit, and the others have left."""
     raid = Raid(sight)
@@ -371,17 +260,6 @@ def test_the_third_boat_sails_the_passage_and_the_others_guard(apart):
     raid.advance(moved(apart, 1.0, {2: {"tagged": True}}))
     assert raid.phase == Phase.GATHER
     assert raid.passage is None
-
-
-def test_without_a_passage_it_waits_in_turn_at_both_edges(apart):
-    raid = raid_with(apart, {n: standing(46.0, y) for n, y in enumerate((8.0, 20.0, 32.0))})
-    waits = []
-    for second in range(90):
-        now = moved(apart, float(second))
-        waits.append(aim_of(raid, now, raid.advance(now), 2).point)
-    assert raid.phase == Phase.GATHER
-    assert {round(y / apart.size[1], 2) for _, y in waits} == {0.15, 0.5, 0.85}
-    assert {x for x, _ in waits} == {apart.line - 2.0}
 
 
 def test_a_second_raid_goes_on_after_the_first_brought_a_flag_home(apart):

@@ -11,24 +11,6 @@ def looked_at(kinds, team, **settings):
     return boats.plans, boats.n_plans
 
 
-@pytest.mark.parametrize(
-    ("kinds", "settings", "count"),
-    [
-        (("surveyor", "surveyor"), {}, [21, 21]),
-        (("surveyor", "surveyor"), {"opponent_model": "turning_circle"}, [27, 27]),
-        (("surveyor", "surveyor"), {"profile": "constant_velocity"}, [27, 27]),
-        (("heron", "surveyor"), {}, [27, 21]),
-        (("heron", "ardurover_boat"), {}, [27, 40]),
-    ],
-)
-def test_so_many_are_looked_at(kinds, settings, count):
-    plans, n_plans = looked_at(kinds, (0, 1), **settings)
-    assert n_plans.tolist() == count
-    for rows, n in zip(plans, n_plans, strict=True):
-        assert np.isfinite(rows[:n]).all()
-        assert np.isnan(rows[n:]).all()
-
-
 def test_gentle_turns_are_for_boats_with_tables_and_slow_ones_for_those_that_need_no_thrust():
     plans, _ = looked_at(("surveyor", "heron", "ardurover_boat"), (0, 1, 1))
     gentle, slow = np.abs(plans[:, :, 0]) < 1.0, (plans[:, :, 2] == 0.5)

@@ -18,7 +18,6 @@ from steerclear.experiments.entries.package import game_spec
 from steerclear.shield import Commands, Fleet, Reason, Shield, ShieldConfig, Surroundings, arrays
 from steerclear.shield.backup.paths import SAG_M
 from steerclear.shield.barriers import Barrier, register_barrier, registry
-from steerclear.shield.batch import BatchedShield
 from steerclear.shield.exceptions import ConfigError
 
 FERRY = (0.0, 45.0, 0.0, -1.5, 10.0)
@@ -86,19 +85,6 @@ def test_a_batch_keeps_out_of_it_too():
     kept = gaps(run)
     assert kept.min() >= 0.0
     assert (kept.min(axis=0) < 6.0).all()
-
-
-def test_a_single_decision_and_a_batch_say_the_same():
-    values = NEAR
-    register_barrier(Barrier("ferry", ferrys, values=values))
-    config, fleet = ShieldConfig(barriers=("ferry",)), lone()
-    fill(fleet.state, packed(["heron"]))
-    decisions = Shield(config).decide(fleet, Commands.game_deg([[1.5, 0.0]]))
-    batch = BatchedShield(config, 1, ("heron",), (0,))
-    sent = batch.decide(fleet.state[None], np.array([[[1.5, 0.0]]]), np.array([[True]]))
-    assert decisions.count_intervened == 1
-    assert np.allclose(sent[0], decisions.filtered.values, atol=1e-6)
-    assert batch.reason[0, 0] == decisions.reason[0]
 
 
 def test_what_binds_is_named():

@@ -8,8 +8,7 @@ import pytest
 from shield_loops import step_all
 from stages import stages_of
 from steerclear.shield import ShieldConfig
-from steerclear.shield.backup.paths import READY_HEADING, READY_SAMPLE, READY_SPEED, sail
-from steerclear.shield.backup.rollout import NO_PURSUERS, PURSUERS, PURSUERS_TILL_READY, lay_path, pursuers_run
+from steerclear.shield.backup.rollout import lay_path
 from steerclear.shield.barriers.neighbours import find_neighbours
 from steerclear.shield.barriers.pursuit import clear_of_pursuer
 from steerclear.shield.batch import BatchedShield
@@ -34,49 +33,6 @@ def opponent(x, y, heading_deg):
     return row
 
 
-def stages(*rows, other="surveyor", **settings):
-    at = stages_of(
-        ShieldConfig(**{"profile": "ramming", "margin_cap_m": 50.0, **settings}),
-        np.array(rows),
-        ["surveyor"] + [other] * (len(rows) - 1),
-        [0] + [1] * (len(rows) - 1),
-    )
-    find_neighbours(at.scene)
-    return at
-
-
-def laid(at, side=1.0, turn_deg=90.0, speed_mps=3.0, done=0):
-    lay_path(0, 0, side, turn_deg, speed_mps, done, at.scene)
-
-
-@pytest.mark.parametrize(("side", "turn_deg"), [(1.0, 0.0), (-1.0, 90.0), (0.5, 180.0)])
-def test_it_is_noted_where_thrust_is_full_by_the_full_model(side, turn_deg):
-    at = stages(slow_boat(), opponent(0.0, 40.0, 180.0))
-    laid(at, side, turn_deg)
-    row, togo, step, params = slow_boat(), turn_deg, 0, SURVEYOR.pack()
-    while row[L.THRUST] < 90.0 or (step - 1) % at.boats.stride or step < at.boats.table_steps[0]:
-        togo = sail(params, row, side, togo, 3.0, 0.1)
-        step += 1
-    k = (step - 1) // at.boats.stride
-    assert at.ready[0, READY_SAMPLE] == k > 0
-    np.testing.assert_allclose(at.path[0, k], row[:2], atol=1e-9)
-    assert at.ready[0, READY_SPEED] == pytest.approx(row[L.SPEED], abs=1e-9)
-    turned = math.degrees(at.ready[0, READY_HEADING]) - row[L.HEADING]
-    assert (turned + 180.0) % 360.0 - 180.0 == pytest.approx(0.0, abs=1e-7)
-
-
-def test_pursuers_are_run_through_only_as_far_as_needed():
-    ahead = opponent(0.0, 30.0, 180.0)
-    for rows, other, how in [
-        ((opponent(0.0, 0.0, 0.0), ahead), "surveyor", NO_PURSUERS),
-        ((slow_boat(), ahead), "surveyor", PURSUERS_TILL_READY),
-        ((slow_boat(), ahead), "large_usv", PURSUERS),
-    ]:
-        at = stages(*rows, other=other)
-        laid(at)
-        assert pursuers_run(0, 0, at.scene) == how
-
-
 def nimble(thrust, speed_mps, *others):
     """A heron with that thrust and others about it, and what is looked at of it."""
     row = fresh_state(0.0, 0.0, 0.0, speed_mps)
@@ -89,32 +45,11 @@ def nimble(thrust, speed_mps, *others):
     return at
 
 
-def herons_samples(at):
-    """Path samples that pursuers are followed for at full thrust, and until thrust is back from rest."""
-    return int(at.boats.pursuit_samples[0] + at.boats.chase_samples[0, 1]), int(at.boats.thrust_samples[0])
-
-
-@pytest.mark.parametrize(("thrust", "speed_mps"), [(0.0, 0.0), (40.0, 1.0), (80.0, 1.6), (86.0, 1.7), (100.0, 2.0)])
-def test_nimble_boats_are_followed_until_their_thrust_is_back_and_as_long_again_as_with_all_of_it(thrust, speed_mps):
-    at = nimble(thrust, speed_mps, fresh_state(0.0, 12.0, 180.0, 2.0))
-    pursuit, build = herons_samples(at)
-    at.path[0] = np.nan
-    laid(at, 1.0, 30.0, 2.0)
-    row, togo, step, params = at.state[0].copy(), 30.0, 0, get_platform("heron").pack()
-    while step == 0 or row[L.THRUST] < 85.0 or (step - 1) % at.boats.stride:
-        togo = sail(params, row, 1.0, togo, 2.0, 0.1)
-        step += 1
-    ready = (step - 1) // at.boats.stride
-    last = min(ready + pursuit, pursuit + build)
-    assert np.isfinite(at.path[0, : last + 1]).all()
-    assert np.isnan(at.path[0, last + 1 :]).all()
-
-
 def test_who_comes_near_only_while_thrust_is_built_up_is_seen_coming():
     """Straight on from rest against a boat 11.5 m astern at 2 m/s: still 5 m away after 6 s, 2 m after 19 s."""
     for thrust, speed_mps, fails in [(0.0, 0.0, True), (100.0, 2.0, False)]:
         at = nimble(thrust, speed_mps, fresh_state(0.0, -11.5, 0.0, 2.0))
-        laid(at, 1.0, 0.0, 2.0)
+        lay_path(0, 0, 1.0, 0.0, 2.0, 0, at.scene)
         assert (clear_of_pursuer(0, 1, 0, -1e6, at.scene) < 0.0) == fails
 
 
@@ -152,13 +87,6 @@ def test_a_boat_that_is_always_slow_is_at_full_thrust_with_what_it_has():
     assert 80.0 < steady < 85.0
     boats = boats_of(ShieldConfig(profile="ramming"), (slow, slow), (0, 1))
     assert boats.ready_thrust[0] == pytest.approx(0.85 * steady)
-
-
-def test_a_boat_that_never_gets_its_thrust_back_is_run_through_to_the_end():
-    at = stages(slow_boat(), opponent(0.0, 30.0, 180.0))
-    laid(at, 1.0, 0.0, 0.0)
-    assert at.ready[0, READY_SAMPLE] == -1.0
-    assert clear_of_pursuer(0, 1, 0, -1e6, at.scene) < 0.0
 
 
 def chased(certificate, count=40, steps=500):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from shield_loops import sail, sail_games, scattered
+from shield_loops import sail
 from steerclear.shield import Commands, Fleet, Reason, Shield, ShieldConfig
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.surroundings import Surroundings
@@ -80,27 +80,6 @@ def test_a_wall_is_stopped_before_that_no_other_rule_keeps():
     )
     run = sail(shield, start, lambda _, state: np.stack([np.full(4, 2.0), 90.0 - state[:, 2]], axis=-1), 200)
     assert (run.position[:, 0, 0] <= SHORE[0][0] - 0.5 + 1e-6).all()
-
-
-def test_a_batch_stops_the_same_boats():
-    config = ShieldConfig(profile="ramming", beyond_m=2.0, beyond_then="stop")
-    around = Surroundings(field=(0.0, 0.0, 25.0, 25.0), polygons=[SHORE])
-    kinds, team = ("heron",) * 4, (0, 0, 1, 1)
-    state = scattered(np.random.default_rng(3), 3, kinds, 25.0, gap_m=5.0)
-
-    def ram(step, state):
-        to = state[..., [2, 3, 0, 1], :2] - state[..., :2]
-        turn = np.degrees(np.arctan2(to[..., 0], to[..., 1])) - state[..., 2]
-        turn[..., :2] = 70.0 - state[..., :2, 2]
-        return np.stack([np.full(turn.shape, 2.0), (turn + 180.0) % 360.0 - 180.0], axis=-1)
-
-    games = sail_games(config, state, kinds, team, ram, 200, surroundings=around)
-    assert (games.reason == Reason.STOPPED).any()
-    for g in range(3):
-        fleet = Fleet(state[g], np.array(team), kinds, np.array(team) == 0, ("a", "b", "c", "d"))
-        one = sail(Shield(config, around), fleet, ram, 200)
-        np.testing.assert_array_equal(one.sent, games.sent[:, g])
-        np.testing.assert_array_equal(one.reason, games.reason[:, g])
 
 
 def test_a_decision_says_how_far_outside_and_that_it_stops():

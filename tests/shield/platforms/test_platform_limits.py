@@ -57,14 +57,6 @@ def test_best_turn_rates(name, speed, rate):
     assert get_platform(name).max_turn_rate_at(speed) == pytest.approx(rate)
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_limits_are_finite_and_positive(name):
-    limits = limits_of(get_platform(name))
-    values = [limits.top_speed_mps, limits.acceleration_mps2, limits.turn_rate_dps, limits.half_turn_s]
-    assert np.isfinite(values).all()
-    assert min(values) > 0.0
-
-
 def seconds_to_thrust(platform, state):
     params, step = platform.pack(), 0
     while state[L.THRUST] < 0.9 * limits_of(platform).thrust:
@@ -85,10 +77,6 @@ def test_thrust_is_back_in_time_from_rest_and_out_of_any_stop(name, about_s):
         step_boat(params, slowing, 0.0, 0.0, 0.1)
         worst = max(worst, seconds_to_thrust(platform, slowing.copy()))
     assert worst <= longest + 0.2
-
-
-def test_boats_without_a_thrust_model_have_theirs_at_once():
-    assert limits_of(get_platform("si")).thrust_s == 0.0
 
 
 @pytest.mark.parametrize("name", ["heron", "surveyor"])

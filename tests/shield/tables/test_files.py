@@ -18,7 +18,6 @@ from steerclear.shield.tables.files import (
     load_table,
     read_table,
     save_table,
-    stack_tables,
     with_figures,
 )
 from steerclear.shield.tables.settings import OtherMay
@@ -183,16 +182,3 @@ def test_cache_folders(monkeypatch, tmp_path, platform, variable, tail):
     monkeypatch.setenv(variable, str(tmp_path / "base"))
     monkeypatch.setattr("sys.platform", platform)
     assert cache_folder().as_posix().endswith(tail)
-
-
-def test_stacked_tables_keep_their_places():
-    tables = stack_tables([random_table(1), TABLE, random_table(2, n_rho=4)])
-    assert tables.level[:, -1].tolist() == [0, 6 * TABLE.values.size, 12 * TABLE.values.size]
-    assert tables.data.size == int(tables.level[2, -1] + 6 * random_table(2, n_rho=4).values.size)
-
-
-def test_arrays_of_something_else_are_no_table(tmp_path):
-    """Such as the record of a game, which is an ``.npz`` file too."""
-    np.savez(tmp_path / "game.npz", position=np.zeros((2, 2)))
-    with pytest.raises(TableError, match=r"game\.npz is no value table; give one that steerclear reach solve has made"):
-        read_table(tmp_path / "game.npz")

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from steerclear.shield.exceptions import TableError
-from steerclear.shield.tables.grid import Grid, even_place, rho_place
+from steerclear.shield.tables.grid import rho_place
 from table_scenes import problem
 
 GRID = problem().grid
@@ -28,12 +28,6 @@ def test_ranges_run_from_end_to_end_and_widen_as_asked():
     assert GRID.ranges_m()[[0, -1]] == pytest.approx([1.0, 12.0])
     assert gaps[-1] / gaps[0] == pytest.approx(GRID.rho_ratio)
     assert (np.diff(gaps) > 0.0).all()
-
-
-@pytest.mark.parametrize(("value", "expected"), [(-1.0, (0, 0.0)), (0.0, (0, 0.0)), (2.25, (2, 0.25)), (4.0, (3, 1.0))])
-def test_even_places_are_clamped(value, expected):
-    assert even_place(value, 4) == expected
-    assert even_place(float("nan"), 4) == (0, 0.0)
 
 
 @pytest.mark.parametrize("name", ["n_rho", "n_psi", "n_beta", "n_own", "n_other"])
@@ -57,9 +51,3 @@ def test_an_axis_of_one_node_is_refused(name):
 def test_impossible_grids_are_refused(change, words):
     with pytest.raises(TableError, match=words):
         replace(GRID, **change)
-
-
-def test_spacings():
-    grid = Grid(10.0, 5, 12, 7, 3, 3, 2.0, 2.0)
-    assert np.degrees([grid.psi_step_rad, grid.beta_step_rad]) == pytest.approx([30.0, 30.0])
-    assert grid.size == 5 * 12 * 7 * 9

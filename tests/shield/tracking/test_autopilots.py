@@ -1,15 +1,11 @@
 """What own autopilots remember is kept by the shield where nobody tells it."""
 
-import math
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from shield_loops import fill, packed, step_all
 from shield_scenes import fleet_of, relative
 from steerclear.shield import Commands, Fleet, Shield
 from steerclear.shield.autopilots import SURPRISE, Autopilots
-from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
 
 STEPS = 150
@@ -137,15 +133,6 @@ def believed_after(fleet, commands, steps, obeys):
 
 
 @pytest.mark.parametrize("platform", ["heron", "surveyor"])
-@pytest.mark.parametrize("commands", [(1.5, 0.0), (0.5, 120.0)])
-def test_it_is_the_boats_own_memory_while_she_obeys(platform, commands):
-    fleet = fleet_of([(0, 0, 0, 0.5)], [0], platform)
-    fill(fleet.state, packed(fleet.platforms))
-    autopilots, state = believed_after(fleet, np.array([commands]), 40, True)
-    np.testing.assert_allclose(autopilots.after[0], state, atol=1e-9)
-
-
-@pytest.mark.parametrize("platform", ["heron", "surveyor"])
 @pytest.mark.parametrize("commands", [(2.0, 0.0), (0.5, 120.0)])
 def test_a_boat_that_does_not_obey_is_taken_for_what_her_speed_tells(platform, commands):
     """Told to speed up or turn she lies still: a thrust built up in the model alone would promise her backups."""
@@ -154,27 +141,6 @@ def test_a_boat_that_does_not_obey_is_taken_for_what_her_speed_tells(platform, c
     obeying, _ = believed_after(fleet, np.array([commands]), 200, True)
     assert (np.abs(disobeying.off) <= SURPRISE).all()  # found out again and again
     assert disobeying.after[0, 0, L.THRUST] < 0.7 * obeying.after[0, 0, L.THRUST]
-
-
-@pytest.mark.parametrize("platform", ["heron", "surveyor"])
-@pytest.mark.parametrize("gains", [{"kd": 0.0}, {"kp": 2.0, "kd": 0.0}])
-def test_another_autopilot_than_the_models_is_found_out(platform, gains):
-    """Without a derivative the last error says nothing: commands would be inverted for a kick that is not there."""
-    kind = get_platform(platform)
-    other = replace(kind, heading_pid=replace(kind.heading_pid, **gains)).pack()[None]
-    fleet = fleet_of([(0, 0, 0, 1.0)], [0], platform)
-    fill(fleet.state, packed(fleet.platforms))
-    autopilots, state, params, ours = Autopilots.of(1), fleet.state.copy(), packed(fleet.platforms), np.array([True])
-    believed = []
-    for step in range(100):
-        seen = state.copy()
-        seen[:, L.THRUST :] = np.nan
-        autopilots.fill(seen, ours, 0.1)
-        believed.append(not np.isnan(seen[0, L.HEADING_ERROR]))
-        commands = np.array([[1.0, 40.0 * np.sin(0.3 * step)]])
-        autopilots.go_on(ours, params, commands, 0.1)
-        step_all(other, state[None], commands[None], 0.1)
-    assert not any(believed[12:])
 
 
 def test_a_boat_that_jumped_is_not_believed_to_be_the_one_before():
@@ -193,20 +159,6 @@ def test_of_old_tracks_nothing_is_believed():
     for _ in range(3):
         shield.decide(fleet, Commands.absolute_rad([[2.0, 0.0]]))
     assert shield._autopilots is None
-
-
-def test_nothing_is_believed_of_boats_without_a_command():
-    fleet = fleet_of([(0, 0, 0, 1.0), (0, 20, 0, 1.0)], [0, 0], "heron")
-    autopilots = Autopilots.of(2)
-    commands = np.array([(math.nan, 0.0), (1.0, 0.0)])
-    both = np.array([True, True])
-    autopilots.fill(fleet.state.copy(), both, 0.1)
-    autopilots.go_on(both, packed(fleet.platforms), commands, 0.1)
-    assert np.isnan(autopilots.after[:, 0]).all()
-    assert np.isfinite(autopilots.after[:, 1]).all()
-    later = Autopilots.of(1)
-    later.carry_over(autopilots, np.array([0]), np.array([1]))
-    np.testing.assert_array_equal(later.after[:, 0], autopilots.after[:, 1])
 
 
 def test_what_was_believed_before_the_memory_was_told_is_not_believed_after_it():
@@ -228,16 +180,3 @@ def test_what_was_believed_before_the_memory_was_told_is_not_believed_after_it()
     shield.decide(fleet, wanted)
     fresh.decide(fleet, wanted)
     np.testing.assert_array_equal(shield._autopilots.after, fresh._autopilots.after)
-
-
-def test_what_is_told_comes_before_what_is_believed():
-    fleet = fleet_of([(0, 0, 0, 1.0)], [0], "heron")
-    fill(fleet.state, packed(fleet.platforms))
-    autopilots, _ = believed_after(fleet, np.array([(1.0, 5.0)]), 3, True)
-    seen, thrust = autopilots.after[0].copy(), autopilots.after[0, 0, L.THRUST]
-    seen[0, L.THRUST] = np.nan
-    seen[0, L.HEADING_ERROR] = -7.0
-    autopilots.fill(seen, np.array([True]), 0.1)
-    assert seen[0, L.HEADING_ERROR] == -7.0
-    assert seen[0, L.THRUST] == thrust
-    assert np.isnan(autopilots.after).all()

@@ -9,7 +9,7 @@ from shield_loops import fill, packed, step_all
 from shield_scenes import bits, fleet_of, head_on, relative
 from steerclear.shield import Fleet, Shield
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.workspace import BACKUP_MARGIN, HAS_BACKUP, N_MEMORY
+from steerclear.shield.workspace import HAS_BACKUP
 
 FAR_AWAY = (1300.0, 0.0, 0.0, 0.0)
 STEPS = 120
@@ -88,21 +88,6 @@ def test_boats_are_told_by_name_platform_and_team(change, forgotten):
     shield._deciders_of(replace(fleet, **change), shield._static(shield.surroundings))
     kept = memory_of(shield)[:, HAS_BACKUP]
     assert np.flatnonzero(kept == 0.0).tolist() == forgotten
-
-
-@pytest.mark.parametrize(("gap_m", "met"), [(20.0, True), (1300.0, False)])
-def test_a_boat_that_meets_a_new_one_keeps_its_backup_but_no_margin(gap_m, met):
-    fleet = fleet_of([(0, 0, 0, 2.0), (0, -12.0, 0, 2.0), (0, gap_m, 180.0, 2.0)], [0, 1, 1])
-    shield = Shield()
-    shield.decide(part(fleet, (0, 1)), relative((2.0, 0.0), (2.0, 0.0)))
-    before = memory_of(shield)
-    assert before[0, BACKUP_MARGIN] > 0.0
-    shield._deciders_of(fleet, shield._static(shield.surroundings))
-    after = memory_of(shield)
-    assert after[0, BACKUP_MARGIN] == (0.0 if met else before[0, BACKUP_MARGIN])
-    alike = [k for k in range(N_MEMORY) if k != BACKUP_MARGIN]
-    np.testing.assert_array_equal(after[0, alike], before[0, alike])
-    assert after[0, N_MEMORY + 1] == before[0, N_MEMORY + 1] != 0.0
 
 
 def test_a_copy_decides_on_its_own():
