@@ -58,6 +58,8 @@ class EntryGames(AblationSettings):
 
     def goals(self, table: pd.DataFrame) -> list[dict[str, Any]]:
         """Judge the zip, which is handed in, and then the shield round the game, each against the bare entry."""
+        import pandas as pd
+
         bare = table[(table["own"] == self.own) & ~table["shielded"]]
         of_zip = table[table["own"] == self.zip_file].assign(shielded=True)
         of_zip = of_zip.assign(pairing=self.own + " vs " + of_zip["opponent"])
