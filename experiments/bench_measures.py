@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 import tracemalloc
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -32,12 +32,13 @@ from .play.spec import MatchSpec
 QUANTILES = {"p50_us": 0.5, "p99_us": 0.99, "p99_9_us": 0.999}
 REFERENCE = "daqp"
 """The solver that programs are collected with and others are compared with."""
-COMPILED = "compiled projection"
+COMPILED = "active set (baselines)"
+"""The compiled solver of the filters that the shield is compared with; the shield itself solves by another."""
 OPPONENTS = ("easy", "medium", "hidden", "rammer")
 PAIR = ("surveyor", "heron")
 """Own boat and opponent of the value table that is looked up in."""
-SPREAD_STEPS = 100
-"""Steps played before timing: boats leave their start places and get in each other's way."""
+SPREAD_STEPS, LEAST_STEPS = 100, 5
+"""Steps before timing, in which boats leave their start places and get in each other's way; steps timed at least."""
 STAGES = {"passes": "pass, backups held", "searches": "pass after a search", "changes": "do not pass"}
 """Kinds of decisions, in words: those whose nominal commands pass on the backups that are held; those that pass after a
 search for others; and those in which some command is short of something, so that backups, program and exact checks
@@ -49,11 +50,21 @@ Times = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class BatchSize:
-    """How much to run: games at once, steps per repeat, repeats."""
+    """How much to run: game-steps per repeat, repeats."""
 
-    games: int = 512
-    steps: int = 100
+    game_steps: int = 25_600
     repeats: int = 5
+
+
+@dataclass(frozen=True)
+class BatchRun:
+    """Games at once: rules, policy of both teams, whether blue is shielded, how many games, threads of the shield."""
+
+    preset: str
+    policy: str
+    shielded: bool
+    games: int
+    threads: int = 1
 
 
 def time_calls(call: Callable[[int], Any], times: int) -> Times:
@@ -116,12 +127,19 @@ class _KeepingShield(Shield):
 Games = Sequence[Sequence[Question]]
 
 
-def questions_of_games(preset: str, game_s: float, seed: int, config: ShieldConfig) -> list[list[Question]]:
-    """Play one shielded game of `medium` against each of `OPPONENTS` and keep every question, game by game."""
+def questions_of_games(
+    preset: str,
+    game_s: float,
+    seed: int,
+    config: ShieldConfig,
+    own: str = "medium",
+    opponents: Sequence[str] = OPPONENTS,
+) -> list[list[Question]]:
+    """Play one shielded game of a policy against each opponent and keep every question, game by game."""
     found = []
-    for number, opponent in enumerate(OPPONENTS, start=seed):
+    for number, opponent in enumerate(opponents, start=seed):
         rules = {"max_time_s": game_s}
-        match = Match(MatchSpec(preset, "medium", opponent, game=number, seed=number, shield={}, rules=rules))
+        match = Match(MatchSpec(preset, own, opponent, game=number, seed=number, shield={}, rules=rules))
         keeping = _KeepingShield(replace(config, dt_s=match.env.config.dt_s))
         match.shielding.env._game.shield = keeping
         match.play()
@@ -223,13 +241,13 @@ def scene(boats: int, seed: int, platform: str = "heron", area_per_boat_m2: floa
     """Draw a fleet, half of it ours, as dense as six boats in an 80 x 40 m field, and where all want to go."""
     rng = np.random.default_rng([boats, seed])
     side_m = float(np.sqrt(boats * area_per_boat_m2))
-    places: list[Array] = []
+    places = np.zeros((0, 2))
     while len(places) < boats:
         place = rng.uniform(0.0, side_m, 2)
-        if all(np.hypot(*(place - other)) > 4.0 for other in places):
-            places.append(place)
+        if (np.hypot(*(places - place).T) > 4.0).all():
+            places = np.vstack([places, place])
     fleet = Fleet.of(
-        position_m=np.array(places),
+        position_m=places,
         heading_rad=rng.uniform(-np.pi, np.pi, boats),
         speed_mps=rng.uniform(0.0, 2.0, boats),
         team=np.arange(boats) % 2,
@@ -238,18 +256,21 @@ def scene(boats: int, seed: int, platform: str = "heron", area_per_boat_m2: floa
     return fleet, Commands.relative_deg(np.column_stack([np.full(boats, 2.0), rng.uniform(-180.0, 180.0, boats)]))
 
 
-def scaled(config: ShieldConfig, boats: int, scenes: int, seed: int) -> dict[str, Any]:
-    """Time one decision in random scenes of so many boats, half of them ours."""
-    shield, times, ours = Shield(config), np.zeros(scenes), 0
+def scaled(config: ShieldConfig, platform: str, boats: int, scenes: int, seed: int) -> dict[str, Any]:
+    """Time one decision, and its `PARTS`, in random scenes of so many boats, half of them ours."""
+    shield, times, parts, ours = Shield(config), np.zeros(scenes), list[list[float]](), 0
     for k in range(scenes):
-        question = Question(*scene(boats, seed + k), None)
+        question = Question(*scene(boats, seed + k, platform), None)
         ours = int(question.fleet.controlled.sum())
         shield.reset()
         question.ask(shield)  # makes working memory and the backups the timed decision goes on from
-        times[k] = time_calls(lambda _, question=question: question.ask(shield), 1)[0]
+        parts.append(_parts_of(shield, question, 1)[1])
+        times[k] = parts[-1][0]
     figures = quantiles_us([times])
+    means = dict(zip(PARTS[1:], np.mean(parts, axis=0)[1:].tolist(), strict=True))
     per_boat = (figures["p50_us"] or 0) / ours
-    return {"boats": boats, "ours": ours, "scenes": scenes, **figures, "us_per_own_boat": per_boat}
+    about = {"platform": platform, "boats": boats, "ours": ours, "scenes": scenes}
+    return {**about, **figures, **means, "us_per_own_boat": per_boat}
 
 
 def solver_times(programs: Sequence[Program], repeats: int) -> list[dict[str, Any]]:
@@ -316,33 +337,49 @@ def lookup_times(lookups: int, repeats: int, seed: int) -> list[dict[str, Any]]:
     return rows
 
 
-def steps_per_s(preset: str, size: BatchSize, policy: str, seed: int, shield: ShieldConfig | None) -> dict[str, Any]:
+def steps_per_s(runs: Sequence[BatchRun], size: BatchSize, seed: int, shield: ShieldConfig) -> list[dict[str, Any]]:
     """Game-steps per second with observations and rewards, both teams of one policy, whose own time is left out.
 
+    All runs take turns in every repeat, so that what slows the machine for a while slows them alike.
+
     Returns:
-        `policy`, `shielded` (the blue team), `games`, `median`, `low` and `high` over the repeats, per second.
+        Per run its fields, and `median`, `low` and `high` over the repeats, per second.
     """
-    core = BatchedMctf(GameConfig.preset(preset, default_start=False, max_time_s=1e6), size.games, seed)
-    teams = [make_batch(policy), make_batch(policy)]
-    for number, team in enumerate(teams):
-        team.reset(core, number, seed + number)
-    command_filter = None if shield is None else games_shield(core, shield).filter_for(0)
-    actions = np.zeros((core.n_games, core.n_boats, 2))
+    games = [_Batch(run, seed, shield) for run in runs]
+    rates = [[one.steps_per_s(size) for one in games] for _ in range(size.repeats)]
+    return [
+        {**asdict(run), "median": float(np.median(mine)), "low": min(mine), "high": max(mine)}
+        for run, mine in zip(runs, zip(*rates, strict=True), strict=True)
+    ]
 
-    def spent_s(steps: int) -> float:
-        spent = 0.0
+
+class _Batch:
+    """The games of a run, played on from repeat to repeat."""
+
+    def __init__(self, run: BatchRun, seed: int, shield: ShieldConfig) -> None:
+        self._core = core = BatchedMctf(
+            GameConfig.preset(run.preset, default_start=False, max_time_s=1e6), run.games, seed
+        )
+        self._teams = [make_batch(run.policy), make_batch(run.policy)]
+        for number, team in enumerate(self._teams):
+            team.reset(core, number, seed + number)
+        self._filter = games_shield(core, shield, threads=run.threads).filter_for(0) if run.shielded else None
+        self._actions = np.zeros((core.n_games, core.n_boats, 2))
+        self._spent_s(SPREAD_STEPS)  # compiles, too
+
+    def steps_per_s(self, size: BatchSize) -> float:
+        steps = max(LEAST_STEPS, size.game_steps // self._core.n_games)
+        return self._core.n_games * steps / self._spent_s(steps)
+
+    def _spent_s(self, steps: int) -> float:
+        core, spent_s = self._core, 0.0
         for _ in range(steps):
-            for number, team in enumerate(teams):
-                actions[:, core.team == number] = team.act(core, number)
+            for number, team in enumerate(self._teams):
+                self._actions[:, core.team == number] = team.act(core, number)
             begun = time.perf_counter()
-            core.step(actions, command_filter)
-            spent += time.perf_counter() - begun
-        return spent
-
-    spent_s(SPREAD_STEPS)  # compiles, too
-    rates = [size.games * size.steps / spent_s(size.steps) for _ in range(size.repeats)]
-    spread = {"median": float(np.median(rates)), "low": min(rates), "high": max(rates)}
-    return {"policy": policy, "shielded": shield is not None, "games": size.games, **spread}
+            core.step(self._actions, self._filter)
+            spent_s += time.perf_counter() - begun
+        return spent_s
 
 
 def memory_mib(make: Callable[[], Any]) -> float:

@@ -32,7 +32,7 @@ def core_of(config: Config, games: int, seed: int, stage: Stage | None = None) -
 def shield_of(config: Config, core: BatchedMctf, team: str = "blue", stage: Stage | None = None) -> Any:
     """The shield of a config for some games, of a stage or of evaluations."""
     settings = ShieldConfig.of(**{**facts_of_games(core).settings(), **config.shield_of(stage)})
-    return games_shield(core, settings, team=team)
+    return games_shield(core, settings, team=team, threads=config.shield_threads)
 
 
 def pool_of(config: Config, stage: Stage) -> Pool:
@@ -81,9 +81,7 @@ class AskedShield:
 class TrainEnv(MctfVecEnv):
     """Every blue boat of every game is a learner; opponents, rewards, shield and rules are those of the stage.
 
-    Where networks are told places or each place has its own, observations end in the boat's place, one-hot. Where
-    nobody of the team holds the flag the network ``first`` decides, if there is one. What the learner chose there
-    changes nothing, so that what it learns from it is zero on average.
+    Where networks are told places or each place has its own, observations end in the boat's place, one-hot.
 
     Attributes:
         batch: the games of the stage under way.
@@ -91,14 +89,13 @@ class TrainEnv(MctfVecEnv):
         spent_s: time in the games, s, shield included.
     """
 
-    def __init__(self, config: Config, first: Any = None) -> None:
-        self.config, self.stage, self._first = config, 0, first
+    def __init__(self, config: Config) -> None:
+        self.config, self.stage = config, 0
         self.spent_s, self._ended = 0.0, []  # type: float, list[dict[str, float]]
         self.batch = self._games(0)
         self._check_stages()
         super().__init__(self.batch)
         core, boats = self.batch.core, len(self.batch.boats)
-        self._carriers, self._roles = carriers_of(core), np.tile(np.arange(boats), core.n_games)
         told = config.net.roles != "shared"
         self._places = np.tile(np.eye(boats, dtype=np.float32), (core.n_games, 1)) if told else None
         if told:
@@ -177,7 +174,7 @@ class TrainEnv(MctfVecEnv):
         began = time.perf_counter()
         if self._guard[1] is not None:
             self._guard[1].moved = 0
-        out = self.batch.step(actions if self._first is None else self._by_first(actions))
+        out = self.batch.step(actions)
         done, boats = out.terminated | out.truncated, len(self.batch.boats)
         for game in np.flatnonzero(done[::boats]) * boats:
             whole = {name: float(np.sum(out.episodes[name][game : game + boats])) for name in OWN_EVENTS}
@@ -199,14 +196,6 @@ class TrainEnv(MctfVecEnv):
 
     def _placed(self, observations: Any) -> Any:
         return observations if self._places is None else np.concatenate([observations, self._places], axis=1)
-
-    def _by_first(self, actions: Any) -> Any:
-        seen = self.batch.core.observations[:, self.batch.boats].reshape(self.batch.learners, -1)
-        free = ~(seen[:, self._carriers] > 0.0).any(axis=1)
-        own = np.array(actions)
-        if free.any():
-            own[free] = np.argmax(self._first.outputs(seen[free], self._roles[free]), axis=1)
-        return own
 
     def ended(self) -> list[dict[str, float]]:
         """Totals of games that have ended since the last call; hits and interventions are all its boats' together."""
@@ -248,13 +237,6 @@ class TrainEnv(MctfVecEnv):
             if name not in saved or saved[name].shape != live.shape:
                 raise ConfigError(f"the checkpoint holds other {name}; resume with the config it was made with")
             live[...] = saved[name]
-
-
-def carriers_of(core: Any) -> np.ndarray:
-    """Numbers of an observation that tell who of the own team holds the flag."""
-    keys = [key if isinstance(key, str) else "/".join(key) for key in core.observation_keys]
-    own = [k for k, key in enumerate(keys) if key.endswith("has_flag") and not key.startswith("opponent")]
-    return np.array(own, np.int64)
 
 
 def _arrays_in(thing: Any, name: str) -> Iterator[tuple[str, np.ndarray]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -131,20 +130,6 @@ class BoatPolicy(ActorCriticPolicy):
         self.mlp_extractor = RoleExtractor(size, self._roles, hidden, self.activation_fn).to(self.device)
 
 
-def layers(size: int, hidden: Sequence[int], outputs: int, activation: str) -> list[nn.Module]:
-    """Layers of a plain network; ``activation`` between them."""
-    widths, act = (size, *hidden), ACTIVATIONS[activation]
-    between = [part for pair in pairwise(widths) for part in (nn.Linear(*pair), act())]
-    return [*between, nn.Linear(widths[-1], outputs)]
-
-
-def numbers_of(network: nn.Module) -> tuple[list[Any], list[Any]]:
-    """Weights (1, in, out) and biases (1, out) of a plain network's layers, as they are now, in numpy."""
-    linear = [layer for layer in network.modules() if isinstance(layer, nn.Linear)]
-    weights = [np.ascontiguousarray(layer.weight.detach().cpu().numpy().T[None]) for layer in linear]
-    return weights, [layer.bias.detach().cpu().numpy()[None].copy() for layer in linear]
-
-
 def network_of(policy: Any, activation: str, card: dict[str, Any]) -> Network:
     """The actor of a policy in numpy, as it is now: no memory is shared with what learns on."""
     tensors = {name: value.detach().cpu().numpy().copy() for name, value in policy.state_dict().items()}
@@ -152,29 +137,17 @@ def network_of(policy: Any, activation: str, card: dict[str, Any]) -> Network:
 
 
 def load_actor(policy: Any, network: Network) -> None:
-    """Put the weights of a network for all boats into a policy's actor, whose hidden layers may be wider.
-
-    What is wider adds units that nothing listens to yet, so that the actor does exactly what the network does.
-    """
-    names = [name for name in policy.state_dict() if name.startswith("mlp_extractor.policy_net")]
-    keys = sorted({name.rsplit(".", 1)[0] for name in names}, key=lambda name: int(name.rsplit(".", 1)[1]))
+    """Put the weights of a network for all boats, of the same shape, into a policy's actor."""
     values = policy.state_dict()
-    layers = [*keys, "action_net"]
+    names = [name for name in values if name.startswith("mlp_extractor.policy_net")]
+    keys = sorted({name.rsplit(".", 1)[0] for name in names}, key=lambda name: int(name.rsplit(".", 1)[1]))
     given = _one_network(network, int(values["features_extractor.places"]))
-    if len(layers) != len(given):
-        raise ValueError(f"{len(given)} layers, wanted {len(layers)}")
-    for key, (weight, bias) in zip(layers, given, strict=True):
-        _put_layer(values[f"{key}.weight"], values[f"{key}.bias"], weight, bias, (key == layers[0], key == layers[-1]))
-
-
-def _put_layer(weight: torch.Tensor, bias: torch.Tensor, given_w: Any, given_b: Any, ends: tuple[bool, bool]) -> None:
-    """Put a layer (in, out) into one (out, in) that is as wide or wider; not wider where it ``ends`` the network."""
-    (n_in, n_out), (rows, columns) = given_w.shape, weight.shape
-    if columns < n_in or rows < n_out or (ends[0] and columns > n_in) or (ends[1] and rows > n_out):
-        raise ValueError(f"a layer of shape {given_w.shape}, wanted {(columns, rows)}")
-    weight[:n_out, :n_in].copy_(torch.as_tensor(given_w.T))
-    weight[:n_out, n_in:] = 0.0
-    bias[:n_out].copy_(torch.as_tensor(given_b))
+    wanted = [tuple(values[f"{key}.weight"].shape[::-1]) for key in (*keys, "action_net")]
+    if (found := [weight.shape for weight, _ in given]) != wanted:
+        raise ValueError(f"layers of shapes {found}, wanted {wanted}")
+    for key, (weight, bias) in zip((*keys, "action_net"), given, strict=True):
+        values[f"{key}.weight"].copy_(torch.as_tensor(weight.T))
+        values[f"{key}.bias"].copy_(torch.as_tensor(bias))
 
 
 def _one_network(network: Network, places: int) -> list[tuple[Any, Any]]:

@@ -1,7 +1,6 @@
 """`PpoTraining`: Stable-Baselines3's PPO on the games of a training, with a curriculum, a league and checkpoints.
 
 A checkpoint is a model as Stable-Baselines3 saves it, and the state of the games beside; none of its pickles is read.
-`TwoPartTraining` is QMIX for play, then PPO for what to do once the flag is held: Richley-NIWC-ATL's team.
 """
 
 from __future__ import annotations
@@ -21,21 +20,19 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
 from steerclear.env.whole_file import whole_file
-from steerclear.policies.entrants.learned.network import Network, joined, read_weights, write_weights
-from steerclear.policies.entrants.learned.sb3_file import TAKES_OVER, add_card
+from steerclear.policies.entrants.learned.network import Network, read_weights, write_weights
+from steerclear.policies.entrants.learned.sb3_file import add_card
 from steerclear.shield.exceptions import ConfigError
 
-from .config import SELF, Config, PpoOptions, QmixOptions
-from .env import TrainEnv, carriers_of
+from .config import SELF, Config
+from .env import TrainEnv
 from .policy import ACTIVATIONS, BoatPolicy, TeamFeatures, features_of, load_actor, network_of
-from .qmix import QmixTraining
-from .training import FINAL, DivergedError, Notice, Training, card_of, device_of, means, threads
+from .training import DivergedError, Notice, Training, card_of, device_of, means, threads
 
-MODEL, SNAPSHOTS, CHECKPOINTS, KEEP, PLAY = "model.zip", "snapshots", "checkpoints", 2, "play"
+MODEL, SNAPSHOTS, CHECKPOINTS, KEEP = "model.zip", "snapshots", "checkpoints", 2
 FACTS, ARRAYS = "steerclear_training.json", "steerclear_games.npz"
 TOLD = ("r", "l", "captures", "captures_against", "grabs", "grabs_against", "tags", "tags_against", "hits")
-ONE_OF_TWO = "give weights of a single network, such as play/final.npz of a training by qmix+ppo"
-MAY_DIFFER = ("decisions", "checkpoint_every", "device")
+MAY_DIFFER = ("decisions", "checkpoint_every", "device", "shield_threads")
 """Keys of a config that a training that is gone on with may have otherwise."""
 _DAMAGED = (zipfile.BadZipFile, KeyError, ValueError, OSError, EOFError, zlib.error)
 _NOT_OURS = (KeyError, ValueError, TypeError, IndexError, AttributeError, RuntimeError, OverflowError)
@@ -59,24 +56,10 @@ class PpoTraining(Training):
 
     def __init__(self, config: Config, folder: Path, resume: bool = False) -> None:
         super().__init__(config, folder)
-        first = config.options.first
-        self.first = _single(first, "first") if first else None
-        self.env = TrainEnv(config, self.first)
-        self.core = self.env.batch.core
-        needed = {"n_obs": self.core.n_obs, "interval": config.interval, "kind": "discrete"}
-        for name, value in needed.items() if self.first is not None else ():
-            if getattr(self.first, name) != value or config.actions != "discrete":
-                raise ConfigError(f"first: {first} has another {name} than the games, which need {value}")
+        self.env = TrainEnv(config)
         self.model = _ppo(config, self.env)
-        self._card = {**card_of(config), TAKES_OVER: self.first is not None}
         if config.start:
-            try:
-                load_actor(self.model.policy, _single(config.start, "start"))
-            except ConfigError:
-                raise  # a kind of ValueError
-            except ValueError as error:
-                words = f"start {config.start} does not fit this network: {error}; give its own net settings"
-                raise ConfigError(words) from None
+            self._begin_with(config.start)
         self.stage_began = self.rollouts = 0
         self._wall_s = 0.0
         self._recent: deque[float] = deque(maxlen=config.stages[0].games)
@@ -84,6 +67,17 @@ class PpoTraining(Training):
         if resume:
             self._resume()
         self._kept = self._packed()
+
+    def _begin_with(self, path: str) -> None:
+        """Put the weights of a file into the actor."""
+        network = read_weights(path)
+        if network.carrying is not None:
+            raise ConfigError(f"start {path} holds two networks; give weights of a single one")
+        try:
+            load_actor(self.model.policy, network)
+        except ValueError as error:
+            words = f"start {path} does not fit this network: {error}; give its own net settings"
+            raise ConfigError(words) from None
 
     def run(self, notice: Notice = lambda done, words: None) -> None:
         """Train to the end; what is interrupted keeps all up to the last whole rollout."""
@@ -173,15 +167,14 @@ class PpoTraining(Training):
         return self.rollouts % self.config.evaluation.every == 0 or self.decisions >= self.total
 
     def network(self) -> Network:
-        """The actor as it is now, behind the network that plays until the flag is held, where there is one."""
-        own = network_of(self.model.policy, self.config.net.activation, card_of(self.config))
-        return own if self.first is None else joined(self.first, own, carriers_of(self.core))
+        """The actor as it is now."""
+        return network_of(self.model.policy, self.config.net.activation, card_of(self.config))
 
     def _saved(self) -> BytesIO:
         """The model with its card."""
         file = BytesIO()
         self.model.save(file)
-        add_card(file, self._card)
+        add_card(file, card_of(self.config))
         return file
 
     def _packed(self) -> Kept:
@@ -365,43 +358,3 @@ def _ppo(config: Config, env: TrainEnv) -> PPO:
         if "policy" in name or name.startswith(("action_net", "log_std")):
             parameter.register_hook(held_back)
     return model
-
-
-def _single(path: str, what: str) -> Network:
-    """The network of a file that holds one."""
-    network = read_weights(path)
-    if network.carrying is not None:
-        raise ConfigError(f"{what} {path} holds two networks; {ONE_OF_TWO}")
-    return network
-
-
-class TwoPartTraining:
-    """QMIX in the folder ``play``, then PPO in the folder itself; resumed, a first part that is done is kept.
-
-    The first stage is QMIX's, all are PPO's; arguments and errors are as of `PpoTraining`.
-    """
-
-    def __init__(self, config: Config, folder: Path, resume: bool = False) -> None:
-        self.config, self.folder, self.resume = config, folder, resume
-        self.weights = folder / PLAY / FINAL
-        self.decisions, self.total = 0, config.decisions
-        self._of_play = max(1, int(config.options.play_share * config.decisions))
-        self._play = None
-        if not (resume and self.weights.exists()):
-            options = QmixOptions(**{name: getattr(config.options, name) for name in QmixOptions.model_fields})
-            own = {"algorithm": "qmix", "device": "auto", "stages": config.stages[:1], "decisions": self._of_play}
-            net = config.net.model_copy(update={"roles": "shared"})
-            play = config.model_copy(update={**own, "options": options, "net": net})
-            self._play = QmixTraining(play, folder / PLAY)
-        elif found := newest(folder):
-            self.decisions = self._of_play + int(read_checkpoint(found)[0]["decisions"])
-
-    def run(self, notice: Notice = lambda done, words: None) -> None:
-        """Train both parts to the end."""
-        if self._play is not None:
-            self._play.folder.mkdir(parents=True, exist_ok=True)
-            self._play.run(lambda done, words: notice(done, f"play, {words}"))
-        left = {"decisions": max(1, self.total - self._of_play), "options": PpoOptions(first=str(self.weights))}
-        second = PpoTraining(self.config.model_copy(update={"algorithm": "ppo", **left}), self.folder, self.resume)
-        second.run(lambda done, words: notice(self._of_play + done, f"with the flag, {words}"))
-        self.decisions = self.total

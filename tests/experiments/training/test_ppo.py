@@ -10,10 +10,13 @@ from steerclear.experiments.training.config import read_config
 from steerclear.experiments.training.ppo import FACTS, PpoTraining, newest, read_checkpoint
 from steerclear.experiments.training.training import DivergedError
 from steerclear.policies.entrants.learned import read_weights
+from steerclear.policies.entrants.learned.network import Features, Network, joined, write_weights
 from steerclear.shield.exceptions import ConfigError
 from typer.testing import CliRunner
 
+NONE = Features(np.zeros(0, np.int64), np.zeros(0, np.int64), 0.0)
 SHIELDED = {
+    "net": {"hidden": [16], "roles": "each"},
     "shield": "training",
     "shield_every": 5,
     "stages": [
@@ -50,18 +53,16 @@ def changes_of(one, two):
     return max(float(np.abs(a - b).max()) for a, b in zip(numbers(one), numbers(two), strict=True))
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [{"net": {"hidden": [16], "roles": "placed"}}, {"net": {"hidden": [16], "roles": "each"}}, SHIELDED],
-    ids=["placed", "each", "stages"],
-)
+@pytest.mark.parametrize("changes", [{"net": {"hidden": [16], "roles": "placed"}}, SHIELDED], ids=["placed", "stages"])
 def test_a_resumed_training_is_the_same_bit_for_bit(tiny, tmp_path, changes):
+    """Whatever threads share the shield's games."""
     reference = trained(tiny(**changes), tmp_path / "whole")
     for stop in (36, 108):
         with pytest.raises(KeyboardInterrupt):
             PpoTraining(read_config(tiny(**changes)), tmp_path / "half", resume=True).run(stop_at(stop))
         rows = json.loads((tmp_path / "half" / "curve.json").read_text())["rows"]
         assert rows[-1]["decisions"] == stop
+        changes = {**changes, "shield_threads": 2}
     again = trained(tiny(**changes), tmp_path / "half", resume=True)
     assert without_time(again.curve) == without_time(reference.curve)
     assert changes_of(again.network(), reference.network()) == 0.0
@@ -150,7 +151,8 @@ def test_exported_networks_play_as_the_trained_ones(tiny, tmp_path, roles):
     import torch
 
     training = trained(tiny(net={"hidden": [16, 8], "roles": roles}, decisions=36), tmp_path / "run")
-    network = read_weights(tmp_path / "run" / "final.npz")
+    path = str(tmp_path / "run" / "final.npz")
+    network = read_weights(path)
     seen = np.random.default_rng(0).uniform(-1, 1, (300, network.n_obs)).astype(np.float32)
     places = np.arange(300) % 3
     told = seen if roles == "shared" else np.concatenate([seen, np.eye(3, dtype=np.float32)[places]], axis=1)
@@ -158,21 +160,26 @@ def test_exported_networks_play_as_the_trained_ones(tiny, tmp_path, roles):
         logits = training.model.policy.get_distribution(torch.as_tensor(told)).distribution.logits.numpy()
     ours = network.outputs(seen, places)
     assert np.abs((ours - ours.max(1, keepdims=True)) - (logits - logits.max(1, keepdims=True))).max() < 1e-5
+    if roles == "each":
+        refused = "start takes one"
+    else:
+        begun = PpoTraining(
+            read_config(tiny(net=training.config.net.model_dump(mode="json"), start=path)), tmp_path / "b"
+        )
+        assert changes_of(begun.network(), network) < 1e-6
+        refused = "layers of shapes"
+    with pytest.raises(ConfigError, match=f"does not fit this network: .*{refused}"):
+        PpoTraining(read_config(tiny(net={"hidden": [8], "roles": roles}, start=path)), tmp_path / "c")
 
 
-@pytest.mark.parametrize("roles", ["shared", "placed"])
-def test_a_wider_network_begins_exactly_as_the_one_it_starts_with_and_then_learns_with_all_of_it(tiny, tmp_path, roles):
-    trained(tiny(net={"hidden": [16, 8], "roles": roles}, decisions=36), tmp_path / "narrow")
-    path = tmp_path / "narrow" / "final.npz"
-    narrow = read_weights(path)
-    net = {"hidden": [24, 20], "roles": roles}
-    wide = PpoTraining(read_config(tiny(net=net, start=str(path), decisions=36)), tmp_path / "wide")
-    seen, places = np.random.default_rng(0).uniform(-1, 1, (300, narrow.n_obs)).astype(np.float32), np.arange(300) % 3
-    np.testing.assert_allclose(wide.network().outputs(seen, places), narrow.outputs(seen, places), atol=1e-5)
-    wide.run()
-    after = wide.network()
-    assert (after.weights[1][:, 16:, :8] != 0.0).all()
-    assert (after.weights[2][:, 8:] != 0.0).all()
-    again = tiny(net={"hidden": [16, 8], "roles": roles}, start=str(tmp_path / "wide" / "final.npz"))
-    with pytest.raises(ConfigError, match="does not fit this network: a layer of shape"):
-        PpoTraining(read_config(again), tmp_path / "again")
+def test_a_pair_of_networks_plays_and_is_exported_and_nothing_begins_with_it(tiny, tmp_path):
+    """As those of teams are whose second network takes over while the flag is held."""
+    one = Network([np.zeros((1, 61, 17), np.float32)], [np.eye(17, dtype=np.float32)[3][None]], NONE, "tanh",
+                  "discrete", 10, 61)  # fmt: skip
+    path = write_weights(joined(one, one, np.array([8])), tmp_path / "pair.npz")
+    with pytest.raises(ConfigError, match="holds two networks"):
+        PpoTraining(read_config(tiny(start=str(path))), tmp_path / "run")
+    result = CliRunner().invoke(app, ["export", str(path), "--interval", "5", "--out", str(tmp_path / "team.npz")])
+    assert result.exit_code == 0, result.output
+    team = read_weights(tmp_path / "team.npz")
+    assert (team.interval, team.carrying.interval) == (5, 5)

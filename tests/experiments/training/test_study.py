@@ -1,5 +1,6 @@
 import json
 import shutil
+from pathlib import Path
 
 import pytest
 from steerclear.experiments.docs import write_pages
@@ -7,6 +8,7 @@ from steerclear.experiments.result_files import write_json
 from steerclear.experiments.runner import RESULTS_FILE
 from steerclear.experiments.training.config import SHIELDS, config_of
 from steerclear.experiments.training.study import config_of_training, learning_of, run_study, trainings_of
+from steerclear.experiments.training.training import training_of
 from steerclear.shield.exceptions import ConfigError
 
 
@@ -54,24 +56,6 @@ def test_the_page_tells_every_cell_with_its_interval(tmp_path):
     assert "| training | on | - | +0.00 | +1.00 | +2.00 | 3.00 |" in page
 
 
-@pytest.fixture(scope="module")
-def base(tiny_content):
-    return config_of({**tiny_content, "evaluation": {"every": 100, "games": 1, "opponents": ["hold"]}})
-
-
-def test_trainings_at_once_give_what_they_give_one_after_another(base, tmp_path):
-    told = []
-    rows = [
-        run_study(base, tmp_path / str(jobs), 1, 1, lambda done, of: told.append((done, of)), jobs)["rows"]
-        for jobs in (1, 2)
-    ]
-    assert rows[0] == rows[1]
-    assert [(row["shield"], row["collision"]) for row in rows[0]] == [
-        (shield, collision) for collision in ("off", "on") for shield in SHIELDS
-    ]
-    assert told[-1] == (6, 6)
-
-
 def test_a_folder_of_another_config_is_not_gone_on_with(tmp_path):
     """Its networks would be taken for those of the config given."""
     base, other = (config_of({"decisions": decisions}) for decisions in (100, 200))
@@ -86,12 +70,29 @@ def test_a_folder_of_another_config_is_not_gone_on_with(tmp_path):
         (tmp_path / name).unlink()
 
 
-def test_a_training_that_fails_is_named_and_the_others_are_kept(base, tmp_path):
-    spoiled = tmp_path / "training-collision_on-seed_0"
+def test_a_study_comes_to_the_same_results_whatever_happens_to_it(tiny_content, tmp_path):
+    """One training was stopped after an evaluation had left weights, one spoiled, and another process goes on."""
+    told, tiny = [], {**tiny_content, "decisions": 72, "stages": [{"opponents": ["hold"]}]}
+    base = config_of({**tiny, "evaluation": {"every": 1, "games": 1, "opponents": ["hold"]}})
+    rows = run_study(base, tmp_path / "whole", 1, 1, lambda done, of: told.append((done, of)))["rows"]
+    assert [(row["shield"], row["collision"]) for row in rows] == [
+        (shield, collision) for collision in ("off", "on") for shield in SHIELDS
+    ]
+    assert told[-1] == (6, 6)
+
+    def stop(done, words):
+        raise KeyboardInterrupt
+
+    folder = tmp_path / "broken"
+    job = trainings_of(base, folder, 1, 1)[0]
+    with pytest.raises(KeyboardInterrupt):
+        training_of(config_of(job["config"]), Path(job["folder"]), False).run(stop)
+    assert (Path(job["folder"]) / "final.npz").exists()
+    spoiled = folder / "training-collision_on-seed_0"
     (spoiled / "checkpoints").mkdir(parents=True)
     (spoiled / "checkpoints" / "00000001.zip").write_bytes(b"no checkpoint")
     with pytest.raises(ConfigError, match=r"7 cells are done and kept; training-collision_on-seed_0: "):
-        run_study(base, tmp_path, 1, 1, lambda done, of: None)
-    assert len(json.loads((tmp_path / RESULTS_FILE).read_text())["rows"]) == 7
+        run_study(base, folder, 1, 1, lambda done, of: None)
+    assert len(json.loads((folder / RESULTS_FILE).read_text())["rows"]) == 7
     shutil.rmtree(spoiled)
-    assert len(run_study(base, tmp_path, 1, 1, lambda done, of: None)["rows"]) == 8
+    assert run_study(base, folder, 1, 1, lambda done, of: None, 2)["rows"] == rows
