@@ -28,7 +28,7 @@ from .jit import Array, BoolArray, copy_row, kernel, lean_kernel
 from .platforms import layout as L
 from .workspace import LARGEST_COMMAND, PASSED, Scene, Static
 
-SHORT_OF_ALL = Rank(OPPONENTS, FAR)
+SHORT_OF_ALL = Rank(OPPONENTS, -FAR)
 """Manoeuvres are rated only as far as it takes to tell whether they satisfy everything."""
 
 

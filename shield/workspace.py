@@ -45,6 +45,11 @@ a teammate has kept the boat from turning, s, its heading when that began, deg, 
 teammate (-1: none), and the side to which it gives way (0: it does not). Then the margin against each opponent, m."""
 
 
+RUN_X, RUN_Y, RUN_EAST, RUN_NORTH, RUN_SPEED, RUN_TO_X, RUN_TO_Y, RUN_WORST, RUN_WEIGHT, N_RUN = range(10)
+"""Columns of a pursuer's run: place, m, heading as a unit vector, speed, m/s, the way to the boat, m, the worst margin
+until now, m, and the weight of one below 0."""
+
+
 class Boats(NamedTuple):
     """Constants of n boats."""
 
@@ -199,7 +204,9 @@ class Scene(NamedTuple):
     ready: Annotated[Array, "n+1", 3]  # what is noted of the path, see `backup.rollout`
     look: Annotated[Array, "n+1", 5]  # place at which the boat is looked up in tables
     clear: Annotated[Array, "n+1", 4]  # clearance row of boats
-    static_clear: Annotated[Array, "n+1", 4]  # clearance row of static constraints
+    static_clear: Annotated[Array, "n+1", 4]  # clearance row of static constraints,
+    static_by: Annotated[IntArray, "n+1"]  # which of them it is from,
+    static_known: Annotated[BoolArray, "n+1"]  # and whether these are of the path that is there
     bound: Annotated[IntArray, "n+1"]  # active constraint: a boat, -1 none, -2 and below static ones
     kept: Annotated[IntArray, "n"]  # what it satisfies, see `backup.rank`,
     worth_m: Annotated[Array, "n"]  # and the other entry of its score
@@ -219,9 +226,10 @@ class Scene(NamedTuple):
     spare2: Annotated[Array, 4]
     ways: Annotated[Array, "n", 3, 5]  # places an opponent may be at when tables are looked into
     lookup: Annotated[Array, "n", "n", 5]  # place of each boat at which each opponent was looked up last, and margin
-    pursuer: Annotated[Array, 5]  # end of a pursuer's run: x, y, heading as a unit vector, speed
+    runs: Annotated[Array, 2, N_RUN]  # runs of a pursuer: straight for the boat, and leading it
+    turns: Annotated[Array, 6, 2]  # cosine and sine of its hardest turns in as many samples and fewer
     first_pursuer: Annotated[IntArray, "n"]  # opponent that is looked at first,
-    first_manner: Annotated[IntArray, "n", "n"]  # and how it is followed first
+    first_rudder: Annotated[IntArray, "n", "n"]  # and how hard it turns in the runs that are made first
     cost: Annotated[Array, "n"]  # what rating a manoeuvre of the boat costs,
     spent: Annotated[Array, 1]  # what this decision has cost until now,
     cut_short: Annotated[BoolArray, 1]  # and whether its search was ended by its limit

@@ -11,8 +11,8 @@ from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..workspace import Scene, all_spent
 from .family import FAMILY, FOUND, IN_MEMORY, candidate, found_turn, remembered
-from .rank import ALL, OBSTACLES, OPPONENTS, WORST, Rank, all_keep, better, rank_path
-from .rollout import lay_path
+from .rank import ALL, OBSTACLES, OPPONENTS, WORST, Rank, all_keep, better, is_no_better, rank_path
+from .rollout import lay_path, lay_placed, place_manoeuvre
 
 SWEEPS = 2
 
@@ -27,6 +27,7 @@ def _take(i: int, slot: int, rank: Rank, scene: Scene) -> None:
     copy_row(scene.ready[i], scene.ready[slot])
     copy_row(scene.clear[i], scene.clear[slot])
     copy_row(scene.static_clear[i], scene.static_clear[slot])
+    scene.static_known[i], scene.static_by[i] = scene.static_known[slot], scene.static_by[slot]
     scene.threat_m[i] = scene.threat_m[slot]
     scene.fails[i] = scene.fails[slot]
     copy_row(scene.threats_m[i], scene.threats_m[slot])
@@ -63,12 +64,15 @@ def choose_plan(i: int, wanted_mps: float, done: int, best_of: bool, scene: Scen
             continue
         if best.kept == ALL and (not best_of or (p == FAMILY and not compared)):
             return
-        side, togo, speed = candidate(i, p, wanted_mps, heading, scene)
-        lay_path(i, trial, side, togo, speed, done, scene)
-        rank = rank_path(i, trial, best, scene)
-        if better(rank, best):
-            best = rank
-            _take(i, trial, rank, scene)
+        place_manoeuvre(i, trial, candidate(i, p, wanted_mps, heading, scene), done, scene)
+        if done == 0 and is_no_better(i, trial, best, scene):
+            scene.spent[0] += scene.cost[i]
+        else:
+            lay_placed(i, trial, done, scene)
+            rank = rank_path(i, trial, best, scene)
+            if better(rank, best):
+                best = rank
+                _take(i, trial, rank, scene)
         if (done == 1 and scene.sealed[trial]) or all_spent(scene):
             return
 

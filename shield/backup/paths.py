@@ -14,7 +14,7 @@ from typing import NamedTuple
 from ..jit import Array, lean_kernel
 from ..platforms import layout as L
 from ..platforms.actuator import actuate, full_turn, held_rudder
-from ..platforms.usv import next_speed, next_thrust, speed_of_thrust, turn_of_rudder
+from ..platforms.usv import kept_share, next_thrust, speed_of_thrust, speed_towards, turn_of_rudder
 
 SAG_M = 0.022
 """Most a straight line between two samples may cut off the arc sailed between them, m."""
@@ -80,6 +80,15 @@ class Straight(NamedTuple):
     y: float
     ux: float
     uy: float
+
+
+class AtThrust(NamedTuple):
+    """What a step with a thrust, percent, comes to: the turn, deg, and the speeds, m/s, tended to on and off it."""
+
+    thrust: float
+    turn_deg: float
+    straight_mps: float
+    turning_mps: float
 
 
 class Settling(NamedTuple):
@@ -193,6 +202,23 @@ def trace_path(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path
 
 
 @lean_kernel
+def _at_thrust(params: Array, thrust: float, most: float, dt_s: float) -> AtThrust:
+    """What hangs on the thrust alone of a step with the rudder at ``most``, percent."""
+    turn, straight_mps = turn_of_rudder(params, thrust, most, dt_s), speed_of_thrust(params, thrust)
+    return AtThrust(thrust, turn, straight_mps, straight_mps * kept_share(params, most * turn / turn))
+
+
+@lean_kernel
+def _turn_of_step(at: AtThrust, togo_deg: float, most: float, params: Array) -> tuple[float, float]:
+    """Turn of a step, deg, with so much to go, and the speed, m/s, that the boat tends to in it."""
+    if not (togo_deg > 0.0 and at.thrust > 0.0):
+        return 0.0, at.straight_mps
+    if togo_deg < at.turn_deg:
+        return togo_deg, at.straight_mps * kept_share(params, most * togo_deg / at.turn_deg)
+    return at.turn_deg, at.turning_mps
+
+
+@lean_kernel
 def _trace_usv(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path: Array, ready: Array) -> None:
     """`trace_path` for thrust boats: the same model in local variables, its heading kept as a unit vector.
 
@@ -209,6 +235,7 @@ def _trace_usv(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path
     sign = math.copysign(1.0, side)
     top = params[L.MAX_SPEED]
     half, c, s = 0.0, 1.0, 0.0
+    at = AtThrust(math.nan, 0.0, 0.0, 0.0)
     gained, before, earlier = 0.0, 0.0, 0.0
     k, step = 0, -1
     if span.done > 0:
@@ -216,12 +243,10 @@ def _trace_usv(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path
     while k <= _last_sample(span, ready):
         last = thrust
         thrust, error, integral = next_thrust(params, v, thrust, error, integral, speed_mps, dt_s)
-        turn, rudder = 0.0, 0.0
-        if togo_deg > 0.0 and thrust > 0.0:
-            full = turn_of_rudder(params, thrust, most, dt_s)
-            turn = min(full, togo_deg)
-            rudder = most * turn / full
-        new_speed = next_speed(params, v, thrust, rudder, dt_s)
+        if thrust != at.thrust:
+            at = _at_thrust(params, thrust, most, dt_s)
+        turn, aim_mps = _turn_of_step(at, togo_deg, most, params)
+        new_speed = speed_towards(params, v, aim_mps, dt_s)
         if new_speed == 0.0:
             turn = 0.0
         mean = 0.5 * (new_speed + v)

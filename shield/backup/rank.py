@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from ..barriers.boats import worst_clearance
 from ..barriers.clearance import FAR, MARGIN, SAMPLE
-from ..barriers.pursuit import worst_pursuer
+from ..barriers.pursuit import falls_short_at_once, worst_pursuer
 from ..barriers.static import clear_of_near_obstacles, clear_of_static
 from ..jit import lean_kernel
 from ..workspace import Scene
@@ -64,11 +64,37 @@ def level_to_beat(best: Rank) -> float:
 
 
 @lean_kernel
+def least_to_beat(best: Rank) -> float:
+    """Margin, m, below which a manoeuvre is no better than the best, whatever else it keeps."""
+    return best.worth_m + SAME_M if best.kept == ALL else -FAR
+
+
+@lean_kernel
+def is_no_better(i: int, slot: int, best: Rank, scene: Scene) -> bool:
+    """Whether a manoeuvre of boat i in ``slot`` is no better than the best, whatever its path, by what tables tell."""
+    least_m = least_to_beat(best)
+    return scene.tuning.margin_cap_m < least_m or falls_short_at_once(i, slot, level_to_beat(best), least_m, scene)
+
+
+@lean_kernel
 def _ask_no_pursuers(slot: int, scene: Scene) -> None:
     """Margins against pursuers of a path of which they do not matter: none is better than that from the others."""
     margin = scene.clear[slot, MARGIN]
     scene.threat_m[slot], scene.threats_m[slot, :], scene.joint_m[slot] = margin, margin, FAR
     scene.sealed[slot], scene.pursuers_known[slot] = False, False
+
+
+@lean_kernel
+def _rank_if_clear(i: int, slot: int, scene: Scene) -> Rank:
+    """Rank of a path that keeps what must be kept from all boats, by static constraints and the margin in ``slot``."""
+    if not scene.static_known[slot]:
+        scene.static_known[slot], scene.static_by[slot] = (
+            True,
+            clear_of_static(i, slot, scene, scene.static_clear[slot]),
+        )
+    to_spare_m = scene.static_clear[slot, MARGIN] - scene.static_target_m[i]
+    spare_m = min(scene.clear[slot, MARGIN], scene.tuning.margin_cap_m)
+    return Rank(ALL, spare_m) if to_spare_m >= 0.0 else Rank(OPPONENTS, to_spare_m + SPARE_WORTH * spare_m)
 
 
 @lean_kernel
@@ -79,11 +105,10 @@ def rank_path(i: int, slot: int, best: Rank, scene: Scene) -> Rank:
     in time second (who is stopped is caught), pursuing opponents third; then all static constraints, and last room to
     spare. The clearance told is from all boats, whatever the rank hangs on.
     """
-    tuning = scene.tuning
     scene.spent[0] += scene.cost[i]
     clear = scene.clear[slot]
-    worst_clearance(i, slot, scene, best.worth_m if best.kept == NOTHING else 0.0)
-    scene.static_clear[slot, MARGIN] = FAR
+    least_m = least_to_beat(best)
+    worst_clearance(i, slot, scene, best.worth_m if best.kept == NOTHING else max(0.0, least_m))
     if not clear[MARGIN] >= 0.0:
         _ask_no_pursuers(slot, scene)
         return Rank(NOTHING, clear[MARGIN])
@@ -91,7 +116,7 @@ def rank_path(i: int, slot: int, best: Rank, scene: Scene) -> Rank:
     if not scene.spare2[MARGIN] >= 0.0:
         rank = Rank(BOATS, scene.spare2[MARGIN] + LATER_WORTH_M * scene.spare2[SAMPLE])
         if better(rank, best):
-            worst_pursuer(i, slot, -FAR, scene)
+            worst_pursuer(i, slot, -FAR, -FAR, scene)
         else:
             _ask_no_pursuers(slot, scene)
         scene.sealed[slot], scene.bound[slot] = False, touched
@@ -100,16 +125,18 @@ def rank_path(i: int, slot: int, best: Rank, scene: Scene) -> Rank:
     if short and not better(Rank(OBSTACLES, sure_m), best):
         _ask_no_pursuers(slot, scene)
         return Rank(OBSTACLES, sure_m)
-    worst_pursuer(i, slot, level_to_beat(best), scene)
+    if best.kept > OBSTACLES:  # what static constraints say is found sooner than what pursuers may do
+        rank = _rank_if_clear(i, slot, scene)
+        if not better(rank, best):
+            _ask_no_pursuers(slot, scene)
+            return rank
+    worst_pursuer(i, slot, level_to_beat(best), least_m, scene)
     if short or scene.fails[slot]:
         return Rank(OBSTACLES, min(sure_m, scene.threat_m[slot]) if short else scene.threat_m[slot])
-    nearest = clear_of_static(i, slot, scene, scene.static_clear[slot])
-    to_spare_m = scene.static_clear[slot, MARGIN] - scene.static_target_m[i]
-    spare_m = min(clear[MARGIN], tuning.margin_cap_m)
-    if to_spare_m >= 0.0:
-        return Rank(ALL, spare_m)
-    scene.bound[slot] = nearest
-    return Rank(OPPONENTS, to_spare_m + SPARE_WORTH * spare_m)
+    rank = _rank_if_clear(i, slot, scene)
+    if rank.kept < ALL:
+        scene.bound[slot] = scene.static_by[slot]
+    return rank
 
 
 @lean_kernel

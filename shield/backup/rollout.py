@@ -49,10 +49,23 @@ def _lay_command(i: int, slot: int, scene: Scene) -> None:
 @lean_kernel
 def lay_path(i: int, slot: int, side: float, togo_deg: float, speed_mps: float, done: int, scene: Scene) -> None:
     """Roll a manoeuvre of boat i out into ``slot``, from its predicted state (done = 1) or its present one (0)."""
-    boats, tuning, manoeuvre = scene.boats, scene.tuning, scene.manoeuvre[slot]
-    manoeuvre[0], manoeuvre[1], manoeuvre[2] = side, togo_deg, speed_mps
-    scene.pursuers_known[slot] = False
+    place_manoeuvre(i, slot, (side, togo_deg, speed_mps), done, scene)
+    lay_placed(i, slot, done, scene)
+
+
+@lean_kernel
+def place_manoeuvre(i: int, slot: int, manoeuvre: tuple[float, float, float], done: int, scene: Scene) -> None:
+    """Write a manoeuvre of boat i (side, turn to go deg, speed m/s) into ``slot``, and where it is looked up."""
+    side, togo_deg, speed_mps = manoeuvre
+    scene.manoeuvre[slot, 0], scene.manoeuvre[slot, 1], scene.manoeuvre[slot, 2] = side, togo_deg, speed_mps
+    scene.pursuers_known[slot], scene.static_known[slot] = False, False
     set_place(i, slot, side, togo_deg, speed_mps, done, scene)
+
+
+@lean_kernel
+def lay_placed(i: int, slot: int, done: int, scene: Scene) -> None:
+    """Roll out the manoeuvre that was placed in ``slot``."""
+    boats, tuning, manoeuvre = scene.boats, scene.tuning, scene.manoeuvre[slot]
     how = pursuers_run(i, slot, scene)
     samples, chased = boats.samples[i], boats.pursuit_samples[i] + boats.chased_samples[i]
     if how != NO_PURSUERS:
@@ -73,6 +86,5 @@ def lay_path(i: int, slot: int, side: float, togo_deg: float, speed_mps: float, 
         min(earliest, samples),
         boats.ready_thrust[i],
     )
-    trace_path(
-        boats.params[i], scene.row, Manoeuvre(side, togo_deg, speed_mps), span, scene.path[slot], scene.ready[slot]
-    )
+    told = Manoeuvre(manoeuvre[0], manoeuvre[1], manoeuvre[2])
+    trace_path(boats.params[i], scene.row, told, span, scene.path[slot], scene.ready[slot])

@@ -33,11 +33,11 @@ def find_neighbours(scene: Scene) -> None:
     scene.spent[0], scene.cut_short[0] = 0.0, False
     scene.cost[:] = PATH_COST
     run_opponents(1, scene)
-    foresee(scene)
     for i in range(scene.state.shape[0]):
         _note_course(i, scene)
         for j in range(i):
             _note_pair(i, j, scene)
+    foresee(scene)
     find_outnumbered(scene)
 
 
@@ -46,7 +46,7 @@ def _note_course(i: int, scene: Scene) -> None:
     """Note where boat i is one step on if it holds its course, before its neighbours are looked at."""
     row, course = scene.state[i], scene.course[i]
     scene.pursued[i], scene.first_pursuer[i] = False, 0
-    scene.first_manner[i, :] = 0
+    scene.first_rudder[i, :] = 0
     scene.reach_samples[i] = _reach_samples(i, scene)
     heading, way = math.radians(row[L.HEADING]), row[L.SPEED] * scene.tuning.model_s
     ux, uy = math.sin(heading), math.cos(heading)
@@ -143,17 +143,26 @@ def may_pursue(j: int, scene: Scene) -> bool:
 
 
 @lean_kernel
+def _near_ours(j: int, scene: Scene) -> bool:
+    """Whether boat j can matter to a boat of ours."""
+    near = False
+    for i in range(scene.ours.shape[0]):
+        near = near or (scene.ours[i] and scene.near[i, j])
+    return near
+
+
+@lean_kernel
 def foresee(scene: Scene) -> None:
     """Write the ways of boats of ``scene.known`` into ``scene.path``: sample 0 is one step of the model from now.
 
-    They are written as far as anybody looks at them: as long as the longest of backup manoeuvres.
+    They are written as far as anybody looks at them: near boats of ours, as long as the longest of backup manoeuvres.
     """
     state, boats, tuning = scene.state, scene.boats, scene.tuning
     last = 0
     for i in range(state.shape[0]):
         last = max(last, boats.samples[i])
     for j in range(state.shape[0]):
-        if not scene.known[j]:
+        if not scene.known[j] or not _near_ours(j, scene):
             continue
         drive, path, row = scene.driven[j], scene.path[j], scene.row
         copy_row(row, state[j])

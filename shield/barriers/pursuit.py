@@ -6,13 +6,24 @@ import math
 from typing import NamedTuple
 
 from ..backup.paths import READY_SAMPLE
-from ..jit import lean_kernel
+from ..jit import Array, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..tables.lookup import WHOLE_S
-from ..workspace import Scene
+from ..workspace import (
+    RUN_EAST,
+    RUN_NORTH,
+    RUN_SPEED,
+    RUN_TO_X,
+    RUN_TO_Y,
+    RUN_WEIGHT,
+    RUN_WORST,
+    RUN_X,
+    RUN_Y,
+    Scene,
+)
 from .clearance import FAR, MARGIN, nearest_on
 from .neighbours import may_pursue
-from .value_function import adversarial_for, margin_when_ready, table_answers, tabled, worst_at_once
+from .value_function import adversarial_for, beyond_table, margin_when_ready, table_answers, tabled, worst_at_once
 
 RUDDERS = (1.0, 0.6, 0.3, 0.0)
 """Hardest turns pursuers are followed with, shares of the granted one.
@@ -27,9 +38,13 @@ LEAD_SHARE = 0.15
 CHASE_LEAD_SHARE = 0.3
 """The same of one that is no faster than the boat and follows it for longer."""
 LONGEST_STRIDE = 6
-"""Samples a pursuer far away is moved on at once."""
+"""Samples a pursuer far away is moved on at once: ``scene.turns`` has a row for each number of them."""
 CHASE_STRIDE = 4
 """Samples a pursuer that is near is moved on at once when it follows a boat that has long run straight."""
+
+
+ROUNDING_M = 1e-6
+"""A pursuer that is past is so by more than this, m."""
 
 
 class Pursuit(NamedTuple):
@@ -41,6 +56,7 @@ class Pursuit(NamedTuple):
     ahead: float  # most samples by which it leads the boat
     fade: float  # factor of negative margins per sample, 0 to 1
     to_table: bool  # follow it to the end also when it comes near no more: a table is looked up there
+    most_m: float  # most that either moves from sample to sample
 
 
 @lean_kernel
@@ -115,20 +131,27 @@ def _never_near(i: int, j: int, slot: int, lasts: int, scene: Scene) -> bool:
     """Whether no run of opponent j, however it steers, ends with less than the cap: then none needs to be made.
 
     The boat stays clear of all points it may have reached by then, and by so much more that the longest strides of
-    `_run_pursuer` make no difference. No decision changes by it; without it those of herons in games, mostly far from
-    everybody, take a third longer. False when in doubt.
+    runs make no difference. A boat clear of one no slower at some sample is so at all before it; of a slower one the
+    room shrinks by no more than what it is slower by from sample to sample back. False when in doubt.
     """
-    path, course, spare = scene.path[slot], scene.course[j], 0.5 * CHASE_STRIDE
-    way = max(scene.boats.params[j, L.MAX_SPEED], scene.state[j, L.SPEED]) * scene.boats.sample_s
-    root, per_m = scene.radius[i, j] + scene.tuning.margin_cap_m, 1.0 / closing(i, j, scene)
-    k = 0
-    while k <= lasts:
+    path, course, sample_s = scene.path[slot], scene.course[j], scene.boats.sample_s
+    way_m, closing_m = _fastest_mps(j, scene) * sample_s, closing(i, j, scene)
+    kept_m = scene.radius[i, j] + scene.tuning.margin_cap_m + (1.0 + 0.5 * CHASE_STRIDE) * closing_m
+    slower_m, k = closing_m - 2.0 * way_m, lasts
+    while True:
         dx, dy = path[k, 0] - course[0], path[k, 1] - course[1]
-        free = (math.sqrt(dx * dx + dy * dy) - way * k - root) * per_m - spare
-        if not free >= 1.0:
+        room_m = math.sqrt(dx * dx + dy * dy) - way_m * k - kept_m
+        if not room_m >= max(0.0, slower_m):
             return False
-        k += int(min(free, lasts + 1))
-    return True
+        if room_m >= slower_m * k:
+            return True
+        k -= int(room_m / slower_m)
+
+
+@lean_kernel
+def _fastest_mps(j: int, scene: Scene) -> float:
+    """Speed that opponent j does not exceed as a pursuer."""
+    return max(scene.boats.params[j, L.MAX_SPEED], scene.state[j, L.SPEED])
 
 
 @lean_kernel
@@ -140,9 +163,16 @@ def _pursuit_of(i: int, j: int, slot: int, lasts: int, closely: int, to_table: b
     boats = scene.boats
     samples = min(lasts, int(scene.ready[slot, READY_SAMPLE])) if to_table else lasts
     fear_s = adversarial_for(i, j, scene.state[i, L.SPEED], scene)
-    adverse = samples if fear_s >= WHOLE_S else min(samples, math.ceil(fear_s / boats.sample_s))
-    ahead = (CHASE_LEAD_SHARE if lasts > closely else LEAD_SHARE) * lasts
-    return Pursuit(samples, adverse, closely, ahead, boats.fade[i] ** (boats.pursuit_samples[i] / lasts), to_table)
+    own_mps = max(boats.fastest_mps[i], scene.state[i, L.SPEED])
+    return Pursuit(
+        samples,
+        samples if fear_s >= WHOLE_S else min(samples, math.ceil(fear_s / boats.sample_s)),
+        closely,
+        (CHASE_LEAD_SHARE if lasts > closely else LEAD_SHARE) * lasts,
+        boats.fade[i] ** (boats.pursuit_samples[i] / lasts),
+        to_table,
+        max(own_mps, _fastest_mps(j, scene)) * boats.sample_s,
+    )
 
 
 @lean_kernel
@@ -155,71 +185,104 @@ def _stride(k: int, free: int, pursuit: Pursuit) -> int:
 
 
 @lean_kernel
-def _hardest_turn(j: int, manner: int, scene: Scene) -> tuple[float, float]:
-    """Turn, rad per sample, of opponent j in a manner, also from rest: it comes soon; share of speed lost in it."""
-    turn = RUDDERS[manner // 2] * (math.radians(scene.boats.granted_turn_dps[j]) * scene.boats.sample_s)
-    return turn, scene.boats.granted_loss[j] * RUDDERS[manner // 2 + 1]
+def _note_turns(j: int, rudder: int, scene: Scene) -> None:
+    """Write cosine and sine of the hardest turns of opponent j in 1, 2, ... samples, also from rest: it comes soon."""
+    turn = RUDDERS[rudder] * (math.radians(scene.boats.granted_turn_dps[j]) * scene.boats.sample_s)
+    turns = scene.turns
+    turns[0, 0], turns[0, 1] = math.cos(turn), math.sin(turn)
+    for k in range(1, turns.shape[0]):
+        turns[k, 0] = turns[k - 1, 0] * turns[0, 0] - turns[k - 1, 1] * turns[0, 1]
+        turns[k, 1] = turns[k - 1, 1] * turns[0, 0] + turns[k - 1, 0] * turns[0, 1]
 
 
 @lean_kernel
-def _run_pursuer(i: int, j: int, slot: int, manner: int, pursuit: Pursuit, floor_m: float, scene: Scene) -> float:
-    """Margin, m, from opponent j that steers for boat i, turning as hard as its manner says, with lead or without.
+def _begin_run(j: int, run: Array, own: Array, scene: Scene) -> None:
+    """Put a run of opponent j where it is one step on."""
+    copy_row(run, scene.course[j])
+    run[RUN_SPEED], run[RUN_WORST], run[RUN_WEIGHT] = scene.state[j, L.SPEED], scene.tuning.margin_cap_m, 1.0
+    run[RUN_TO_X], run[RUN_TO_Y] = own[0, 0] - run[RUN_X], own[0, 1] - run[RUN_Y]
+
+
+@lean_kernel
+def _is_past(k: int, x: float, y: float, worst: float, own: Array, radius_m: float, pursuit: Pursuit) -> bool:
+    """Whether a run at (x, y) cannot lower its margin any more, however it steers: what is left is too short."""
+    dx, dy = own[pursuit.samples, 0] - x, own[pursuit.samples, 1] - y
+    reach_m = radius_m + worst + ROUNDING_M + (pursuit.samples - k) * pursuit.most_m
+    return not pursuit.to_table and dx * dx + dy * dy >= reach_m * reach_m
+
+
+@lean_kernel
+def _move_on(k: int, lead: int, i: int, j: int, slot: int, loss: float, pursuit: Pursuit, scene: Scene) -> int:
+    """Move a run of opponent j on from sample k; returns the sample it then is at, the last where it is past."""
+    run, own, sample_s = scene.runs[lead], scene.path[slot], scene.boats.sample_s
+    x, y, ux, uy, speed_mps = run[RUN_X], run[RUN_Y], run[RUN_EAST], run[RUN_NORTH], run[RUN_SPEED]
+    x0, y0, worst, weight = run[RUN_TO_X], run[RUN_TO_Y], run[RUN_WORST], run[RUN_WEIGHT]
+    radius_m, closing_m = scene.radius[i, j], closing(i, j, scene)
+    root, free, square = radius_m + scene.tuning.margin_cap_m, 0, x0 * x0 + y0 * y0
+    worth = (root + 2.0 * closing_m) * (root + 2.0 * closing_m)
+    if square > worth:
+        free = int((math.sqrt(square) - root) / closing_m)
+    if _is_past(k, x, y, worst, own, radius_m, pursuit):
+        return pursuit.samples
+    stride = _stride(k, free, pursuit)
+    k += stride
+    ax, ay = own[k, 0] - x, own[k, 1] - y
+    if lead == 1:
+        vx, vy = (own[k, 0] - own[k - stride, 0]) / stride, (own[k, 1] - own[k - stride, 1]) / stride
+        ax, ay = _aim(x0, y0, vx, vy, speed_mps * sample_s, pursuit.ahead)
+    time_s, new_speed = stride * sample_s, speed_mps
+    if k <= pursuit.adverse:
+        ux, uy, rudder = _turn_towards(ux, uy, ax, ay, scene.turns[stride - 1, 0], scene.turns[stride - 1, 1])
+        new_speed = _speed_after(j, speed_mps, _fastest_mps(j, scene) * (1.0 - loss * rudder), time_s, scene)
+    way = 0.5 * (speed_mps + new_speed) * time_s
+    x, y = x + way * ux, y + way * uy
+    x1, y1 = own[k, 0] - x, own[k, 1] - y
+    for _ in range(stride):
+        weight *= pursuit.fade
+    run[RUN_X], run[RUN_Y], run[RUN_EAST], run[RUN_NORTH], run[RUN_SPEED] = x, y, ux, uy, new_speed
+    run[RUN_TO_X], run[RUN_TO_Y], run[RUN_WEIGHT] = x1, y1, weight
+    run[RUN_WORST] = _faded(worst, weight, radius_m, x0, y0, x1, y1)
+    return k
+
+
+@lean_kernel
+def _run_pursuers(i: int, j: int, slot: int, rudder: int, pursuit: Pursuit, floor_m: float, scene: Scene) -> float:
+    """Margin, m, from opponent j that turns so hard and steers for boat i, or that leads it: the worse of the two.
 
     Negative margins fade with the time until they come about: a graze far off is less of an evil than a ramming soon,
     for pursuers rarely play as well as they are granted to. The search stops once the margin is below the floor; its
-    cap is one for all, since a pursuer's strides depend on it and must not depend on who is looked at before.
+    cap is one for all, since a pursuer's strides depend on it and must not depend on who is looked at before. The two
+    are moved on in turns, since a processor does as much at once as does not hang on what comes just before.
     """
-    boats, own, course = scene.boats, scene.path[slot], scene.course[j]
-    x, y, ux, uy, speed_mps = course[0], course[1], course[2], course[3], scene.state[j, L.SPEED]
-    sample_s, radius_m, closing_m = boats.sample_s, scene.radius[i, j], closing(i, j, scene)
-    turn, loss = _hardest_turn(j, manner, scene)
-    fastest_mps, worst, weight = max(boats.params[j, L.MAX_SPEED], speed_mps), scene.tuning.margin_cap_m, 1.0
-    root, c1, s1 = radius_m + worst, math.cos(turn), math.sin(turn)
-    worth = (root + 2.0 * closing_m) * (root + 2.0 * closing_m)
-    x0, y0, k = own[0, 0] - x, own[0, 1] - y, 0
-    while k < pursuit.samples:
-        free, square = 0, x0 * x0 + y0 * y0
-        if square > worth:
-            free = int((math.sqrt(square) - root) / closing_m)
-            if free >= pursuit.samples - k and not pursuit.to_table:
-                break
-        stride, c, s = _stride(k, free, pursuit), c1, s1
-        for _ in range(stride - 1):
-            c, s = c * c1 - s * s1, s * c1 + c * s1
-        k += stride
-        ax, ay = own[k, 0] - x, own[k, 1] - y
-        if manner % 2 == 1:  # with lead
-            vx, vy = (own[k, 0] - own[k - stride, 0]) / stride, (own[k, 1] - own[k - stride, 1]) / stride
-            ax, ay = _aim(x0, y0, vx, vy, speed_mps * sample_s, pursuit.ahead)
-        time_s, new_speed = stride * sample_s, speed_mps
-        if k <= pursuit.adverse:
-            ux, uy, rudder = _turn_towards(ux, uy, ax, ay, c, s)
-            new_speed = _speed_after(j, speed_mps, fastest_mps * (1.0 - loss * rudder), time_s, scene)
-        way = 0.5 * (speed_mps + new_speed) * time_s
-        speed_mps, x, y = new_speed, x + way * ux, y + way * uy
-        x1, y1 = own[k, 0] - x, own[k, 1] - y
-        for _ in range(stride):
-            weight *= pursuit.fade
-        worst = _faded(worst, weight, radius_m, x0, y0, x1, y1)
-        if worst < floor_m:
-            return worst
-        x0, y0 = x1, y1
-    if not pursuit.to_table:
-        return worst
-    end = scene.pursuer
-    end[0], end[1], end[2], end[3], end[4] = x, y, ux, uy, speed_mps
-    value_m = margin_when_ready(i, j, slot, scene)
-    return min(worst, value_m * weight if value_m < 0.0 else value_m)
+    runs, last, loss = scene.runs, pursuit.samples, scene.boats.granted_loss[j] * RUDDERS[rudder + 1]
+    _note_turns(j, rudder, scene)
+    for lead in range(2):
+        _begin_run(j, runs[lead], scene.path[slot], scene)
+    k, ahead = 0, 0
+    while k < last or ahead < last:
+        if k < last:
+            k = _move_on(k, 0, i, j, slot, loss, pursuit, scene)
+        if ahead < last:
+            ahead = _move_on(ahead, 1, i, j, slot, loss, pursuit, scene)
+        if min(runs[0, RUN_WORST], runs[1, RUN_WORST]) < floor_m:
+            break
+    worst_m = min(runs[0, RUN_WORST], runs[1, RUN_WORST])
+    if not pursuit.to_table or worst_m < floor_m:
+        return worst_m
+    for lead in range(2):
+        value_m = margin_when_ready(i, j, slot, runs[lead], scene)
+        worst_m = min(worst_m, value_m * runs[lead, RUN_WEIGHT] if value_m < 0.0 else value_m)
+    return worst_m
 
 
 @lean_kernel
 def clear_of_pursuer(i: int, j: int, slot: int, floor_m: float, scene: Scene) -> float:
     """Margin, m, of boat i on the path in ``slot`` from opponent j using the turn and thrust granted to it against it.
 
-    The worst of several pursuers: steering at the boat or for the meeting point, turning hard or gently. The one that
-    came below its floor last is looked at first. They are followed until the boat's thrust is full and as long beyond
-    as such a boat needs to get away; where a table is for the pair it tells what they can do from where thrust is full,
-    of an outnumbered boat (see `value_function.find_outnumbered`) not before ``boats.joint_samples``.
+    The worst of several pursuers: steering at the boat or for the meeting point, turning hard or gently. Those that
+    came below their floor last are looked at first. They are followed until the boat's thrust is full and as long
+    beyond as such a boat needs to get away; where a table is for the pair it tells what they can do from where thrust
+    is full, of an outnumbered boat (see `value_function.find_outnumbered`) not before ``boats.joint_samples``.
     """
     boats, ready = scene.boats, int(scene.ready[slot, READY_SAMPLE])
     to_table = ready >= 0 and tabled(i, j, scene)
@@ -227,16 +290,18 @@ def clear_of_pursuer(i: int, j: int, slot: int, floor_m: float, scene: Scene) ->
     if ready >= 0:
         closely = min(closely, ready + boats.pursuit_samples[i])
     lasts = closely + (0 if to_table else boats.chase_samples[i, j])
+    if to_table and beyond_table(i, j, slot, scene):
+        return scene.tuning.margin_cap_m
     if not to_table and _never_near(i, j, slot, lasts, scene):
         return scene.tuning.margin_cap_m
     pursuit, worst_m = _pursuit_of(i, j, slot, lasts, closely, to_table, scene), FAR
-    manners = 2 * (len(RUDDERS) - 1) if boats.granted_loss[j] > FORGOTTEN_LOSS else 2
-    first = min(scene.first_manner[i, j], manners - 1)
-    for number in range(manners):
-        manner = _first_then_rest(first, number)
-        worst_m = min(worst_m, _run_pursuer(i, j, slot, manner, pursuit, floor_m, scene))
+    rudders = len(RUDDERS) - 1 if boats.granted_loss[j] > FORGOTTEN_LOSS else 1
+    first = min(scene.first_rudder[i, j], rudders - 1)
+    for number in range(rudders):
+        rudder = _first_then_rest(first, number)
+        worst_m = min(worst_m, _run_pursuers(i, j, slot, rudder, pursuit, floor_m, scene))
         if worst_m < floor_m:
-            scene.first_manner[i, j] = manner
+            scene.first_rudder[i, j] = rudder
             break
     return worst_m
 
@@ -257,14 +322,14 @@ def _note(margin_m: float, j: int, slot: int, scene: Scene) -> None:
 
 
 @lean_kernel
-def _clear_of_threat(i: int, j: int, slot: int, level_m: float, scene: Scene) -> bool:
-    """Note the worst that opponent j may do; False when it is short of its target and below the level.
+def _clear_of_threat(i: int, j: int, slot: int, level_m: float, least_m: float, scene: Scene) -> bool:
+    """Note the worst that opponent j may do; False when it is short of its target and below the level, or of the least.
 
     An outnumbered boat is also rolled out for a while, and looked up from there; on a manoeuvre on which thrust never
     is full it is lost.
     """
     target_m = scene.threat_target_m[i, j]
-    floor_m, by_table = min(target_m, level_m), table_answers(i, j, slot, scene)
+    floor_m, by_table = max(least_m, min(target_m, level_m)), table_answers(i, j, slot, scene)
     if by_table:
         margin_m = worst_at_once(i, j, slot, scene)
         scene.table_m[slot] = min(scene.table_m[slot], margin_m)
@@ -275,7 +340,7 @@ def _clear_of_threat(i: int, j: int, slot: int, level_m: float, scene: Scene) ->
     _note(margin_m, j, slot, scene)
     if not margin_m >= floor_m or not by_table or not scene.outnumbered[i]:
         return margin_m >= floor_m
-    floor_m, margin_m = min(scene.joint_target_m[i], level_m), -scene.radius[i, j]
+    floor_m, margin_m = max(least_m, min(scene.joint_target_m[i], level_m)), -scene.radius[i, j]
     if scene.ready[slot, READY_SAMPLE] >= 0.0:
         margin_m = clear_of_pursuer(i, j, slot, floor_m, scene)
     scene.joint_m[slot] = min(scene.joint_m[slot], margin_m)
@@ -293,29 +358,45 @@ def _falls_short(i: int, slot: int, scene: Scene) -> bool:
 
 
 @lean_kernel
-def worst_pursuer(i: int, slot: int, level_m: float, scene: Scene) -> None:
+def _may_harm(i: int, j: int, scene: Scene) -> bool:
+    """Whether boat j is an opponent that is looked at as a pursuer of boat i."""
+    team, near = scene.boats.team, j != i and scene.near[i, j] and not scene.breach[i, j]
+    return near and not scene.ours[j] and team[i] != team[j] and may_pursue(j, scene)
+
+
+@lean_kernel
+def falls_short_at_once(i: int, slot: int, level_m: float, least_m: float, scene: Scene) -> bool:
+    """Whether `worst_pursuer` would stop by what tables tell of the place in ``slot``, whatever the path there."""
+    for j in range(scene.ours.shape[0]):
+        if _may_harm(i, j, scene) and table_answers(i, j, slot, scene):
+            floor_m = max(least_m, min(scene.threat_target_m[i, j], level_m))
+            if worst_at_once(i, j, slot, scene) < floor_m:
+                return True
+    return False
+
+
+@lean_kernel
+def worst_pursuer(i: int, slot: int, level_m: float, least_m: float, scene: Scene) -> None:
     """Clearance from each pursuer, in ``scene.threats_m[slot]``; that in ``slot`` is lowered where it is worse.
 
     What is known in full of a path is not asked again: it hangs on no teammate's manoeuvre, nor on the targets.
 
-    Of one that is short of its target (``scene.fails``) and below the level nothing more is to be known: the search
-    stops. Who came there last is looked at first, so that of many manoeuvres those that fail cost little.
+    Of one that is short of its target (``scene.fails``) and below the level, or below the least, nothing more is to be
+    known: the search stops. Who came there last is looked at first: of many manoeuvres those that fail cost little.
 
     ``scene.sealed[slot]`` says whether the boat is short of a target by what a table tells of where it is looked up
     first, and by nothing worse. One step on (done = 1) that is one place for all manoeuvres: then none does better.
     """
-    team = scene.boats.team
     if not scene.pursuers_known[slot]:
         scene.pursuers_known[slot], scene.sealed[slot], scene.threat_by[slot] = True, False, -1
         scene.threats_m[slot, :], scene.joint_m[slot] = FAR, FAR
         scene.table_m[slot], scene.threat_m[slot] = FAR, FAR
         first = scene.first_pursuer[i]
-        for number in range(team.shape[0]):
+        for number in range(scene.ours.shape[0]):
             j = _first_then_rest(first, number)
-            near = j != i and scene.near[i, j] and not scene.breach[i, j]
-            if not near or scene.ours[j] or team[i] == team[j] or not may_pursue(j, scene):
+            if not _may_harm(i, j, scene):
                 continue
-            if not _clear_of_threat(i, j, slot, level_m, scene):
+            if not _clear_of_threat(i, j, slot, level_m, least_m, scene):
                 scene.first_pursuer[i], scene.pursuers_known[slot] = j, False
                 break
         scene.sealed[slot] = scene.sealed[slot] and scene.threat_m[slot] >= scene.table_m[slot]

@@ -149,13 +149,27 @@ def _clearance(
             behind = not behind
         if behind:
             margin, nx, ny = -near_m - obstacle_clearance_m - k * drift_m, -nx, -ny
-        else:
+        elif excused < 0.0:
             margin -= excused * sampling.grace**k + k * drift_m
+        else:
+            margin -= k * drift_m
         lowered = lowered or margin < out[MARGIN]
         lower(out, margin, k, nx, ny)
         x, y = path[k, 0], path[k, 1]
         k += 1 if moves else max(1, int(min(margin - out[MARGIN], near_m) / fall_m))
     return lowered
+
+
+@lean_kernel
+def _clear_of_sides(here: Array, path: Array, sampling: Sampling, static: Static, out: Array) -> None:
+    """Lower a clearance row to that from the sides of the field, but those that the boat is beyond."""
+    for side in range(SIDES):
+        margin_m, nx, ny = to_side(here[0], here[1], side, static.field)
+        if margin_m < 0.0 or margin_m == math.inf:
+            continue
+        for k in range(sampling.side + 1):
+            margin_m = to_side(path[k, 0], path[k, 1], side, static.field)[0] - k * sampling.drift_m
+            lower(out, margin_m, k, nx, ny)
 
 
 @lean_kernel
@@ -193,18 +207,21 @@ def clear_of_constraints(
     active, beyond, back_m = -1, -1, 0.0
     obstacles = count_obstacles(static)
     total = obstacles + static.keep_out.shape[0] + SIDES
+    if not near_only:
+        _clear_of_sides(here, path, sampling, static, out)
     for o in range(obstacles if near_only else total + 1):
+        if total - SIDES <= o < total:
+            continue
         now_m = margin_at(o, here[0], here[1], 0.0, static)[0]
         barrier = registered_number(o, static)
         if (barrier >= 0 and now_m <= LOST_M) or (o == total and now_m >= 0.0):
             continue
-        side = total - SIDES <= o < total
         if o >= obstacles and now_m < 0.0:
-            worth_m = 0.0 if side else _way_back(o, now_m, path, sampling, static)
+            worth_m = _way_back(o, now_m, path, sampling, static)
             if worth_m < back_m:
                 beyond, back_m = o, worth_m
             continue
-        last = sampling.near if near_only else (sampling.side if side else sampling.last)
+        last = sampling.near if near_only else sampling.last
         if _clearance(o, now_m, last, here, path, sampling, static, out):
             active = barrier
     if beyond >= 0:

@@ -20,8 +20,8 @@ from ..platforms import layout as L
 from ..platforms.actuator import actuate
 from ..platforms.usv import turn_of_rudder
 from ..tables.grid import CAP
-from ..tables.lookup import table_value
-from ..workspace import Scene
+from ..tables.lookup import full_from_m, table_value
+from ..workspace import RUN_EAST, RUN_NORTH, RUN_SPEED, RUN_X, RUN_Y, Scene
 from .clearance import FAR
 
 WAYS = 3
@@ -129,15 +129,26 @@ def table_answers(i: int, j: int, slot: int, scene: Scene) -> bool:
 
 
 @lean_kernel
-def margin_when_ready(i: int, j: int, slot: int, scene: Scene) -> float:
-    """Margin, m, of boat i where a run of opponent j ends that is to be looked up, in ``scene.pursuer``."""
-    boats = scene.boats
-    path, ready, pursuer = scene.path[slot], scene.ready[slot], scene.pursuer
+def beyond_table(i: int, j: int, slot: int, scene: Scene) -> bool:
+    """Whether opponent j cannot be where its table tells anything by the time it is looked up, nor near before."""
+    boats, path, ready, course = scene.boats, scene.path[slot], scene.ready[slot], scene.course[j]
+    own_mps = max(boats.fastest_mps[i], scene.state[i, L.SPEED])
+    other_mps = max(boats.params[j, L.MAX_SPEED], scene.state[j, L.SPEED])
+    fear_s = adversarial_for(i, j, ready[READY_SPEED], scene)
+    kept_m = max(full_from_m(boats.tables, boats.table[i, j], fear_s), scene.radius[i, j] + scene.tuning.margin_cap_m)
+    gap_m = math.hypot(path[0, 0] - course[0], path[0, 1] - course[1])
+    return gap_m >= kept_m + ROOM_M + (own_mps + other_mps) * boats.sample_s * ready[READY_SAMPLE]
+
+
+@lean_kernel
+def margin_when_ready(i: int, j: int, slot: int, run: Array, scene: Scene) -> float:
+    """Margin, m, of boat i where a run of opponent j ends that is to be looked up."""
+    boats, path, ready = scene.boats, scene.path[slot], scene.ready[slot]
     table, k = boats.table[i, j], int(ready[READY_SAMPLE])
     fear_s = adversarial_for(i, j, ready[READY_SPEED], scene)
-    dx, dy, heading = pursuer[0] - path[k, 0], pursuer[1] - path[k, 1], math.atan2(pursuer[2], pursuer[3])
+    dx, dy, heading = run[RUN_X] - path[k, 0], run[RUN_Y] - path[k, 1], math.atan2(run[RUN_EAST], run[RUN_NORTH])
     own_heading, own_mps = ready[READY_HEADING], ready[READY_SPEED]
-    value = table_value(boats.tables, table, fear_s, dx, dy, own_heading, heading, own_mps, pursuer[4])
+    value = table_value(boats.tables, table, fear_s, dx, dy, own_heading, heading, own_mps, run[RUN_SPEED])
     return _margin_of(i, j, value, scene)
 
 

@@ -62,7 +62,9 @@ def list_movers(scene: Scene) -> int:
 @lean_kernel
 def _given_up(i: int, scene: Scene) -> float:
     """What boat i is short of its distance from boats and static constraints, m."""
-    least = min(reported_margin(i, scene), scene.static_clear[i, MARGIN])
+    least = reported_margin(i, scene)
+    if scene.kept[i] >= OPPONENTS:
+        least = min(least, scene.static_clear[i, MARGIN])
     if scene.kept[i] == BOATS:  # of an obstacle near in time nothing else is noted
         clear_of_near_obstacles(i, i, scene, 0.0, scene.spare2)
         least = min(least, scene.spare2[MARGIN])

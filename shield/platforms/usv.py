@@ -141,7 +141,18 @@ def turn_of_rudder(params: Array, thrust: float, rudder: float, dt_s: float) -> 
 @lean_kernel
 def next_speed(params: Array, speed_mps: float, thrust: float, rudder: float, dt_s: float) -> float:
     """Speed at the end of a step, m/s, before the hull's mean is stored."""
-    speed = speed_of_thrust(params, thrust) * (1.0 - (abs(rudder) / 100.0) * params[L.TURN_LOSS])
+    return speed_towards(params, speed_mps, speed_of_thrust(params, thrust) * kept_share(params, rudder), dt_s)
+
+
+@lean_kernel
+def kept_share(params: Array, rudder: float) -> float:
+    """Share of its speed that a boat keeps in a turn with a rudder, percent."""
+    return 1.0 - (abs(rudder) / 100.0) * params[L.TURN_LOSS]
+
+
+@lean_kernel
+def speed_towards(params: Array, speed_mps: float, speed: float, dt_s: float) -> float:
+    """Speed at the end of a step that tends to ``speed``, m/s, as fast as the platform may gain or lose it."""
     max_acc = params[L.MAX_ACC]
     max_dec = params[L.MAX_DEC]
     if max_acc > 0.0 and (speed - speed_mps) / dt_s > max_acc:

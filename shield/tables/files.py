@@ -278,17 +278,26 @@ def stack_tables(tables: Sequence[ValueTable]) -> Tables:
     if not tables:
         return no_tables()
     blocks: list[NDArray[np.uint8]] = []
-    level = np.zeros((len(tables), N_LEVELS), np.int64)
+    level, full_m = np.zeros((len(tables), N_LEVELS), np.int64), np.zeros((len(tables), N_LEVELS))
     at = 0
-    for row, table in zip(level, tables, strict=True):
-        row[:] = at
+    for row, full, table in zip(level, full_m, tables, strict=True):
+        row[:], full[:] = at, _full_from_m(table, table.values)
         blocks.append(table.values.ravel())
         at += table.values.size
         for k in [LEVELS_S.index(time_s) for time_s in table.card.levels_s if time_s in LEVELS_S]:
-            row[k] = at
+            row[k], full[k] = at, _full_from_m(table, table.levels[k])
             blocks.append(table.levels[k].ravel())
             at += table.values.size
-    return Tables(np.concatenate(blocks), level, np.stack([table.card.make_grid().pack() for table in tables]))
+    axes = np.stack([table.card.make_grid().pack() for table in tables])
+    return Tables(np.concatenate(blocks), level, axes, np.maximum.accumulate(full_m, axis=1))
+
+
+def _full_from_m(table: ValueTable, values: NDArray[np.uint8]) -> float:
+    """Range, m, no less than the cap, from which on values are nothing but that; infinite where there is none."""
+    grid = table.card.make_grid()
+    below = np.flatnonzero((values != STEPS).any(axis=(1, 2, 3, 4)))
+    first = int(below[-1]) + 1 if len(below) else 0
+    return max(grid.cap_m, float(grid.ranges_m()[first])) if first < grid.n_rho else np.inf
 
 
 def with_figures(table: ValueTable, **figures: object) -> ValueTable:

@@ -46,6 +46,7 @@ class Tables(NamedTuple):
     data: NDArray[np.uint8]  # all values, uint8, in steps of cap / 255
     level: IntArray  # where each table's levels begin, the last for the whole play, shape ``(n_tables, N_LEVELS)``
     axes: Array  # each table's grid, shape ``(n_tables, N_AXES)``
+    full_m: Array  # range from which on a level, and all before it, hold nothing but the cap, as ``level``
 
 
 class Gradient(NamedTuple):
@@ -65,7 +66,9 @@ class Gradient(NamedTuple):
 
 def no_tables() -> Tables:
     """An empty set, for code that takes tables but has none."""
-    return Tables(np.zeros(0, np.uint8), np.zeros((0, N_LEVELS), np.int64), np.zeros((0, N_AXES)))
+    return Tables(
+        np.zeros(0, np.uint8), np.zeros((0, N_LEVELS), np.int64), np.zeros((0, N_AXES)), np.zeros((0, N_LEVELS))
+    )
 
 
 def pack(values_m: NDArray[Any], cap_m: float) -> NDArray[np.uint8]:
@@ -119,6 +122,13 @@ def _level_of(tables: Tables, table: int, horizon_s: float) -> tuple[int, float]
 
 
 @lean_kernel
+def full_from_m(tables: Tables, table: int, horizon_s: float) -> float:
+    """Range, m, from which on a table tells nothing but its cap for a time T."""
+    low, part = _level_of(tables, table, horizon_s)
+    return tables.full_m[table, low + 1 if part > 0.0 else max(0, low)]
+
+
+@lean_kernel
 def table_value(
     tables: Tables,
     table: int,
@@ -141,9 +151,11 @@ def table_value(
     rho = math.sqrt(dx_m * dx_m + dy_m * dy_m)
     if rho < axes[RHO_FIRST]:
         return rho
+    low, part = _level_of(tables, table, horizon_s)
+    if rho >= full_from_m(tables, table, horizon_s):
+        return axes[CAP]
     psi, beta, _ = _angle_places(axes, math.atan2(dx_m, dy_m), own_heading_rad, other_heading_rad)
     own, other = _speed_places(axes, own_speed_mps, other_speed_mps)
-    low, part = _level_of(tables, table, horizon_s)
     value = 0.0
     for k in range(low, low + (2 if part > 0.0 else 1)):
         share = part if k > low else 1.0 - part

@@ -10,7 +10,15 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import RegularGridInterpolator
 from steerclear.shield.tables.files import stack_tables
-from steerclear.shield.tables.lookup import LEVELS_S, WHOLE_S, no_tables, table_gradient, table_range_m, table_value
+from steerclear.shield.tables.lookup import (
+    LEVELS_S,
+    WHOLE_S,
+    full_from_m,
+    no_tables,
+    table_gradient,
+    table_range_m,
+    table_value,
+)
 from table_scenes import random_table
 
 TABLE = random_table()
@@ -160,3 +168,17 @@ def test_a_table_without_shorter_times_fears_for_the_whole_play():
     tables, state = stack_tables([old]), (4.0, 5.0, 0.3, 2.0, 1.1, 0.7)
     for fear_s in (0.0, 1.0, 5.0, 50.0):
         assert table_value(tables, 0, fear_s, *state) == table_value(TABLES, 1, WHOLE_S, *state)
+
+
+def test_beyond_a_range_there_is_nothing_but_the_cap():
+    """Where every value of the farthest ranges is that, nothing is looked up; what is nearer is as before."""
+    values = TABLE.values.copy()
+    values[-3:] = 255
+    far = stack_tables([replace(TABLE, values=values, levels=np.full_like(TABLE.levels, 255))])
+    grid = TABLE.card.make_grid()
+    from_m = full_from_m(far, 0, WHOLE_S)
+    assert from_m == max(grid.cap_m, grid.ranges_m()[-3])
+    assert full_from_m(far, 0, LEVELS_S[0]) == grid.cap_m
+    assert table_value(far, 0, WHOLE_S, 0.0, from_m, 0.1, 0.2, 1.0, 1.0) == grid.cap_m
+    assert table_value(far, 0, WHOLE_S, 0.0, from_m - 1e-9, 0.1, 0.2, 1.0, 1.0) == pytest.approx(grid.cap_m)
+    assert math.isinf(full_from_m(TABLES, 1, WHOLE_S)) or (TABLE.values[-1] == 255).all()
