@@ -146,7 +146,7 @@ def quick(settings: AnySettings, max_time_s: float, games: int) -> AnySettings:
 
 
 def results_of(run: Run, settings: AblationSettings, is_quick: bool = False) -> dict[str, Any]:
-    """Put together the content of results.json, which `docs_keys.KEYS` describes, of what was played."""
+    """Put together the content of results.json, which `docs.KEYS` describes, of what was played."""
     import pandas as pd
 
     rows = with_states(run.rows, settings.covered)
@@ -172,7 +172,6 @@ def results_of(run: Run, settings: AblationSettings, is_quick: bool = False) -> 
         "pairings": [one | ({"heads": heads} if (heads := settings.heads(one["pairing"])) else {}) for one in pairings],
         "goals": goals,
         "breaches": all_breaches(rows),
-        "deprecated": {"bars": goals},
     }
 
 

@@ -113,7 +113,7 @@ def run_bench(settings: BenchSettings, notice: Callable[[str], None] = lambda wo
         notice: told what is being measured.
 
     Returns:
-        JSON-ready, see ``bench`` in `docs_keys.KEYS`.
+        JSON-ready, see ``bench`` in `docs.KEYS`.
     """
     started, content = time.perf_counter(), dict[str, Any]()
     shield = ShieldConfig(separation_m=RADII_M[0])  # in every game the same shield
@@ -143,7 +143,7 @@ def run_bench(settings: BenchSettings, notice: Callable[[str], None] = lambda wo
     content["scaling"] = [_scaled(settings, platform, boats, shield) for platform in PAIR for boats in settings.counts]
     content["settings"] = asdict(settings)
     goals = bench_goals(content)
-    return {**head_of("bench", asdict(settings), started), **content, "goals": goals, "deprecated": {"bars": goals}}
+    return {**head_of("bench", asdict(settings), started), **content, "goals": goals}
 
 
 def _policy_times(settings: BenchSettings, preset: str, policy: str, shield: ShieldConfig) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from steerclear.policies import make_batch
 from steerclear.shield import Commands, Decisions, Fleet, Shield, ShieldConfig, Surroundings
 from steerclear.shield.decide import begin, decide_all, take_up
 from steerclear.shield.filter.program import Program, Solver, solve
-from steerclear.shield.jit import Array
+from steerclear.shield.jit import Array, kernel
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.tables.files import load_table, stack_tables
 from steerclear.shield.tables.lookup import WHOLE_S, Tables, table_gradient, table_range_m, table_value
@@ -25,7 +25,6 @@ from steerclear.shield.workspace import Scene
 from steerclear.shield.wrappers import games_shield
 
 from .baselines.active_set import OPTIMAL, project
-from .jit import kernel
 from .play.match import Match
 from .play.spec import MatchSpec
 

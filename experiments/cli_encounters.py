@@ -42,7 +42,7 @@ class SceneOptions:
 
     def given(self) -> Conditions:
         """The conditions; ConfigError where one is out of range."""
-        return Conditions(self.radius, self.delay, self.noise, self.current)
+        return Conditions(self.delay, self.noise, self.current, self.radius)
 
 
 @dataclass(frozen=True)
@@ -193,7 +193,6 @@ def attack(
     what: SearchOptions,
     scenes: SceneOptions,
     where: SceneRunOptions,
-    replay: Annotated[list[Path] | None, o.option("FILE", "Play found scenes again instead.", "--replay")] = None,
 ) -> None:
     """Search for opponents that get within the radius although it could be kept; keep what is found as scenes.
 
@@ -202,9 +201,6 @@ def attack(
     guards = parse_filters(what.guard)
     if len(guards) != 1:
         raise ConfigError(f"--filter names {len(guards)} safety filters; attack one at a time")
-    if replay:
-        finish(play_scene_files(replay, guards, where.folder))
-        return
     pairs = platform_pairs(what.platform)
     if len(pairs) != 1:
         raise ConfigError(f"attack takes one --platform, own or own/attackers', not {len(pairs)}")

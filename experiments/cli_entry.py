@@ -17,7 +17,7 @@ from .ablation import spec_of
 from .cli_games import end_run, run_games
 from .console import App, finish, progress, say, warn
 from .entries.check import always_late, check_entry, headline
-from .entries.report_page import EntryGames, games_to_look_at, shielded_zip, write_entry_page
+from .entries.report_page import PAGE, EntryGames, entry_report, games_to_look_at, shielded_zip
 from .entries.team import is_entry
 from .entries.wrap import wrap_entry
 from .play.match import play_again
@@ -118,11 +118,10 @@ class ReportedGames(o.GamesOptions):
 def report(
     entry: Entry,
     game: o.RuleOptions,
-    kept: o.KeptOptions,
+    kept: o.ShieldOptions,
     many: ReportedGames,
     where: o.RunOptions,
     also: Annotated[str | None, o.option("A.zip,B.zip", "Further opponents: entries or policies.")] = None,
-    looks: Annotated[int, o.option("N", "Pairs of games to keep as replays, 0 to 3.")] = 2,
     answer_time: o.AnswerTime = ANSWER_S,
 ) -> None:
     """Play an entry alone, as the zip that `entry wrap` writes, and with the shield round the game; write entry.html.
@@ -130,8 +129,6 @@ def report(
     Exit status: 0 done, 2 bad input or an entry that never played, 130 interrupted.
     """
     check_path(entry)
-    if not 0 <= looks <= 3:
-        raise ConfigError(f"--looks is {looks}; give 0 to 3")
     names = o.split_names(many.opponents + (f",{also}" if also else ""), "--opponents")
     shield, workers = kept.of_game(game.preset, game.given()), where.workers()
     for name in names:
@@ -156,32 +153,33 @@ def report(
     results, run = run_games("entry report", settings, where, many.quick)
     results["warnings"] += why_none
     if not run.interrupted:
-        _write_page(settings, run, results, looks, workers)
+        _write_page(settings, run, results, workers)
     end_run(results, run, where)
 
 
-def _write_page(settings: EntryGames, run: Run, results: dict[str, Any], looks: int, workers: Workers) -> None:
+def _write_page(settings: EntryGames, run: Run, results: dict[str, Any], workers: Workers) -> None:
     """Write the page and the replays of the games to look at, and say where they are."""
     specs, rows, folder = settings.specs(), run.rows, run.folder
     if not rows:
         return
     links = []
-    for number, (words, off, on) in enumerate(games_to_look_at(rows, settings, looks)):
+    for number, (words, off, on) in enumerate(games_to_look_at(rows, settings)):
         chosen = [replace(spec_of(row, specs), judge="none") for row in (off, on)]
         with progress(f"replay {number + 1}", 1):
             played = play_again(chosen, workers)
         if len(played) == len(chosen):
             name, label = f"look_{number + 1}.html", f"{off['pairing']}, game {off['game']}"
             write_replay([played[spec.key].record for spec in chosen], folder / name, f"{label}: {words}")
-            links.append((f"{words}: {label}", name))
-    links.append(("all figures and every game", results["files"]["report"]))
-    say(write_entry_page(rows, settings, folder, links, results["warnings"]))
+            links.append({"label": f"{words}: {label}", "path": name})
+    links.append({"label": "all figures and every game", "path": results["files"]["report"]})
+    page = replace(entry_report(rows, settings), warnings=results["warnings"], links=links)
+    say(page.write(folder / PAGE))
 
 
 @app.command()
 def wrap(
     entry: Entry,
-    kept: o.KeptOptions,
+    kept: o.ShieldOptions,
     out_file: Annotated[Path, o.option("FILE", "The zip to write; a new file.", "--out"), NEW],
     preset: o.Preset = "mctf2026",
     json_file: o.JsonFile = None,

@@ -6,12 +6,12 @@ MANY_OPTIONS = 13
 """A command with more options leaves those of `RARE` out of ``--help``, which then fits one screen."""
 
 RARE = {
-    *("--set", "--shield-set", "--opponent-model", "--solver", "--profile", "--fixed-start", "--penalty", "--trust"),
+    *("--set", "--shield-set", "--profile", "--fixed-start", "--penalty", "--trust"),
     *("--answer-time", "--delay", "--noise", "--current", "--judge", "--no-judge", "--no-shield-autopilot"),
-    *("--engine", "--address", "--looks", "--also", "--finalists", "--qualifying", "--replays", "--scene"),
+    *("--engine", "--address", "--also", "--scene"),
     *("--restarts", "--population", "--generations", "--attackers", "--no-tlog", "--wait"),
     *("--wind", "--loss", "--jitter", "--boot", "--really", "--off", "--with-parent", "--allow-remote"),
-    *("--no-wait", "--random-start", "--max-time", "--keyboard"),
+    *("--no-wait", "--random-start", "--max-time"),
 }
 """Options that few need, of whatever command has them."""
 

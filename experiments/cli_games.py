@@ -22,7 +22,7 @@ from .console import command, finish, out, progress, say, warn
 from .game_metrics import check_penalty
 from .metrics import RADII_M
 from .play.conditions import words_of, words_of_settings
-from .play.match import play_match
+from .play.match import MatchResult, play_match
 from .play.spec import MatchSpec, check_shield
 from .policy_checks import check_run, made_of
 from .provenance import head_of
@@ -63,10 +63,6 @@ class WindowOptions:
     """How a game is looked at."""
 
     window: Annotated[bool, o.flag("Show the game in a window.", "--window/--headless")] = False
-    keyboard: Annotated[
-        bool,
-        o.flag("Steer the first own boat with the arrow keys, as --own keyboard does (a window opens).", "--keyboard"),
-    ] = False
     speed: Annotated[float, o.option("X", "Times faster than the game, in a window.")] = 4.0
     save: Annotated[
         list[Path] | None,
@@ -89,45 +85,18 @@ def play(
 
     Exit status: 0 done, 2 bad input or a policy that never played, 130 interrupted.
     """
-    if look.keyboard and who.own not in ("medium", "keyboard"):
-        raise ConfigError(f"--keyboard steers the own boats itself; leave out --keyboard, or --own {who.own}")
-    asked, rules, files = shield.given(), game.given(), look.save or []
-    if asked and not who.shield:
-        raise ConfigError(f"the shield is off, and {', '.join(asked)} would change nothing; add --shield")
-    own = "keyboard" if look.keyboard else who.own
-    spec = MatchSpec(
-        game.preset,
-        own,
-        who.opponent,
-        seed=who.seed,
-        side=who.side,
-        shield=o.with_distance(asked, game.preset, rules) if who.shield else None,
-        shield_autopilot=not who.no_shield_autopilot,
-        rules=rules,
-        conditions=water.given(),
-        files=(policies.fingerprint(own), policies.fingerprint(who.opponent)),
-        **how.given(),
-    )
-    check_penalty(spec.penalty)
     if not 0.0 < look.speed < math.inf:
         raise ConfigError(f"--speed must be a number above 0; got {look.speed:g}")
-    started, names = time.perf_counter(), (spec.own, spec.opponent)
+    files, started = look.save or [], time.perf_counter()
+    spec = _spec_of(who, game, shield, how, water)
+    check_penalty(spec.penalty)
     check_endings(files)
+    names = (spec.own, spec.opponent)
     check_run(names, spec.config(), spec.shield, warn, spec.conditions, spec.trust, many=False)
     if KEYBOARD in names:
         warn(STEERING)
-    if look.window or KEYBOARD in names:
-        result = play_match(spec, _until_closed, "human", look.speed)
-    else:
-        steps = count(1)
-        with progress("playing", round(spec.config().max_time_s / spec.config().decision_s)) as notice:
-
-            def watch(env: MctfEnv) -> bool:
-                if (step := next(steps)) % 50 == 0:
-                    notice(step)
-                return True
-
-            result = play_match(spec, watch)
+    human = look.window or KEYBOARD in names
+    result = play_match(spec, _until_closed, "human", look.speed) if human else _played(spec)
     row = result.row
     out().print(game_table(row, spec.radii_m))
     if row["first_failure"]:
@@ -137,6 +106,41 @@ def play(
     write_json(json_file, {**head_of("play", asdict(spec), started), "game": row, "files": written})
     if held := held_games([row]):
         raise PolicyError("; ".join(held))
+
+
+def _spec_of(
+    who: PlayerOptions, game: o.RuleOptions, shield: o.ShieldOptions, how: o.PlayOptions, water: o.WaterOptions
+) -> MatchSpec:
+    """The one game that options ask for."""
+    asked, rules = shield.given(), game.given()
+    if asked and not who.shield:
+        raise ConfigError(f"the shield is off, and {', '.join(asked)} would change nothing; add --shield")
+    return MatchSpec(
+        game.preset,
+        who.own,
+        who.opponent,
+        seed=who.seed,
+        side=who.side,
+        shield=o.with_distance(asked, game.preset, rules) if who.shield else None,
+        shield_autopilot=not who.no_shield_autopilot,
+        rules=rules,
+        conditions=water.given(),
+        files=(policies.fingerprint(who.own), policies.fingerprint(who.opponent)),
+        **how.given(),
+    )
+
+
+def _played(spec: MatchSpec) -> MatchResult:
+    """Play a game that nobody looks at, and tell how far it is."""
+    steps, config = count(1), spec.config()
+    with progress("playing", round(config.max_time_s / config.decision_s)) as notice:
+
+        def watch(env: MctfEnv) -> bool:
+            if (step := next(steps)) % 50 == 0:
+                notice(step)
+            return True
+
+        return play_match(spec, watch)
 
 
 def _until_closed(env: MctfEnv) -> bool:

@@ -62,8 +62,8 @@ ShieldSet = Annotated[list[str] | None, option("KEY=VALUE", "Any shield setting.
 
 
 @dataclass(frozen=True)
-class KeptOptions:
-    """What a shield keeps, and from whom."""
+class ShieldOptions:
+    """What a shield keeps, and from whom; any other setting."""
 
     separation: Annotated[
         float | None, option("M", "Radius the shield keeps, m.", default="at which the game counts")
@@ -74,24 +74,13 @@ class KeptOptions:
     def given(self) -> dict[str, Any]:
         """The settings of the shield that were given, each once; hits are counted at the separation as well."""
         named = {"separation_m": self.separation, "profile": self.profile}
-        more = {name: getattr(self, name, None) for name in ("opponent_model", "solver")}
-        given = current_settings(_together({**named, **more}, self.shield_set, "--shield-set"), warned=True)
+        given = current_settings(_together(named, self.shield_set, "--shield-set"), warned=True)
         ShieldConfig.of(**{name: value for name, value in given.items() if name == "separation_m"})
         return given
 
     def of_game(self, preset: str, rules: dict[str, Any]) -> dict[str, Any]:
         """The same for a game: where none is given it keeps the distance at which the game counts collisions."""
         return with_distance(self.given(), preset, rules)
-
-
-@dataclass(frozen=True)
-class ShieldOptions(KeptOptions):
-    """Settings of a shield."""
-
-    opponent_model: Annotated[
-        str | None, option("NAME", "How the shield predicts opponents.", "--opponent-model", "--certificate")
-    ] = None
-    solver: Annotated[str | None, option("NAME", "QP solver of the shield.")] = None
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,6 @@ class BoatOptions:
 
 OtherMay = Annotated[str, o.option("MODE", "What the other boat may do: worst-case or cooperative.")]
 Radius = Annotated[float, o.option("M", "Separation radius, m.")]
-Picture = Annotated[Path | None, o.option("FILE", "Also draw the sets, as PNG or SVG; a new file."), NEW]
 
 
 @app.command()
@@ -60,9 +59,6 @@ def solve(
     ] = None,
     jobs: o.Jobs = None,
     quick: Annotated[bool, o.flag("A coarse grid and few runs: for a first look only.", "--quick")] = False,
-    checkpoint: Annotated[
-        Path | None, o.option("FILE", "Where an interrupted solve is kept.", default="beside --out")
-    ] = None,
 ) -> None:
     """Solve the game of two boats and write its value table.
 
@@ -75,7 +71,7 @@ def solve(
     check_radii(problem, radii)
     target = out_file or F.cache_folder() / f"{problem.name}.npz"
     check_new(target, "--out")
-    kept = checkpoint or target.with_name(target.name + ".checkpoint")
+    kept = target.with_name(target.name + ".checkpoint")
     try:
         with bars() as begin:
 
@@ -95,18 +91,9 @@ def solve(
 def show(
     boats: BoatOptions,
     other_may: OtherMay = "worst-case",
-    radius: Annotated[
-        list[float] | None,
-        o.option("M", "Separation radius that --picture draws, m; may be repeated.", "--radius", default="2.5, 4"),
-    ] = None,
     file: Annotated[Path | None, o.option("FILE", "A table file instead of the installed one.")] = None,
-    picture: Picture = None,
 ) -> None:
-    """Show a table's card and the sets in which a radius cannot be kept."""
-    P.check_picture(picture)
-    radii = tuple(radius) if radius else RADII_M
-    if radius and picture is None:
-        raise TableError("--radius is what --picture draws; the card has its own radii: give --picture FILE as well")
+    """Show a table's card: how it was made, what it is worth, the areas in which a radius cannot be kept."""
     if file is None:
         table = F.load_table(boats.own, boats.other, other_may)
     else:
@@ -117,11 +104,7 @@ def show(
         except TableError as error:
             words = "is left as it is: name that table's boats, or leave --file out"
             raise TableError(f"{error}; {file} {words}") from error
-    check_radii(problem_of(boats.own, boats.other, other_may), radii)
     P.show_card(out(), table.card)
-    if picture is not None:
-        P.draw_sets(table, radii, picture)
-        say(f"picture: {picture}")
 
 
 @app.command()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,19 +11,16 @@ from steerclear.shield.exceptions import PolicyError
 from . import cli_options as o
 from . import tournament as cup
 from .cli_games import met
-from .console import command, finish, out, progress, say, warn
+from .console import command, finish, out, say, warn
 from .game_metrics import check_penalty
 from .play.spec import MatchSpec, check_shield
 from .policy_checks import check_run
-from .rankings import SCRIPTED
-from .runner import Run
+from .rankings import SCRIPTED, all_tables
 from .tables import goals_table, titled
-from .tournament_pages import all_tables, chosen_games, cycle_lines, subtitle, write_html, write_replays
 from .verdicts import check_judge
-from .workers import Workers
 
 QUICK_TIME_S = 120.0
-WIDE = 104
+WIDE = 120
 """Characters of the widest table: ranks, scores and collisions with intervals, and the paper's."""
 
 
@@ -39,8 +36,6 @@ class CupOptions:
         o.option("WHO", "off, all, or teams with commas; may be repeated.", "--shield", default="off, all"),
     ] = None
     repetitions: Annotated[int, o.option("N", "Times each pair meets on each side.")] = 1
-    qualifying: Annotated[bool, o.flag("Play easy, medium and hidden first.", "--qualifying")] = False
-    finalists: Annotated[int | None, o.option("N", "Best of the qualifying that go on.", default="all")] = None
     seed: o.Seed = 0
     quick: o.Quick = False
     judge: o.Judge = "shielded"
@@ -50,10 +45,9 @@ class CupOptions:
 def tournament(
     who: CupOptions,
     game: o.RuleOptions,
-    kept: o.KeptOptions,
+    kept: o.ShieldOptions,
     how: o.PlayOptions,
     where: o.RunOptions,
-    replays: Annotated[bool, o.flag("Play best, worst and most changed game again.", "--replays/--no-replays")] = True,
     check: o.Check = False,
 ) -> None:
     """Let teams meet each other on both sides, with the shield and without; tables beside the paper's, report, replays.
@@ -66,22 +60,26 @@ def tournament(
         states=tuple(who.shield or (cup.OFF, cup.ALL)),
         repetitions=who.repetitions,
         seed=who.seed,
-        qualifying=who.qualifying,
-        finalists=who.finalists,
         judge=check_judge(who.judge),
         shield=kept.of_game(game.preset, game.given()),
         rules=game.given(),
         **how.given(),
     )
     check_penalty(settings.penalty)
-    settings = cup.quick(settings, QUICK_TIME_S) if who.quick else settings
-    workers, config = where.workers(), MatchSpec.of_job(settings.final(settings.teams)[0]).config()
+    if who.quick:
+        settings = replace(settings, repetitions=1, rules={"max_time_s": QUICK_TIME_S, **settings.rules})
+    experiment, workers = settings.experiment(), where.workers()
+    config = MatchSpec.of_job(experiment.jobs[0]).config()
     check_shield(settings.shield, config)
     shielded = set(settings.states) - {cup.OFF}
     check_run(settings.teams, config, settings.shield if shielded else None, warn, trust=settings.trust)
-    with progress("games", settings.expected) as notice:
-        run = cup.play(settings, where.folder_of("tournament"), workers, where.resume, notice, warn)
-    results = _write(run, settings, workers if replays else None)
+    run = where.run(experiment)
+    results = cup.results_of(run, settings)
+    if run.rows:
+        links = [] if run.interrupted else cup.write_most_changed(run, settings, workers)
+        results["files"] |= {"report": "report.html"} | ({"replay": "replay.html"} if links else {})
+        cup.write_html(results, run.folder / "report.html", links)
+        run.write(results)
     _show(results, run.folder)
     if not run.interrupted:
         where.copy(results)
@@ -92,25 +90,10 @@ def tournament(
     finish(not check or met(results))
 
 
-def _write(run: Run, settings: cup.TournamentSettings, replaying: Workers | None) -> dict[str, Any]:
-    results = cup.results_of(run, settings)
-    if run.rows:
-        links: list[dict[str, str]] = []
-        if replaying is not None and not run.interrupted:
-            chosen = chosen_games(run, cup.compared_states(settings))
-            links = write_replays(chosen, run.folder, replaying)
-        results["files"] |= {"report": "report.html"}
-        results["files"] |= {f"replay_{k}": link["path"] for k, link in enumerate(links, start=1)}
-        write_html(results, run.folder / "report.html", links)
-        run.write(results)
-    return results
-
-
 def _show(results: dict[str, Any], folder: Path) -> None:
-    say(f"{subtitle(results)}\n", *(f"WARNING: {words}\n" for words in results["warnings"]))
+    say(f"{cup.subtitle(results)}\n", *(f"WARNING: {words}\n" for words in results["warnings"]))
     for table in all_tables(results):
         out(WIDE).print(titled(table.title, table.heads, table.rows), "")
-    say(*cycle_lines(results))
     if results["goals"]:
         out().print(goals_table(results["goals"]))
     for one in results["failed"]:

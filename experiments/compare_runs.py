@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +11,7 @@ from steerclear.shield.exceptions import ConfigError
 
 from .metrics import Metric, game_metrics_of
 from .result_files import read_json
-from .runner import OLD_ROWS_FILE, RESULTS_FILE, ROWS_FILE, job_id, read_line
+from .runner import RESULTS_FILE, ROWS_FILE, check_version, read_line
 from .statistics import DIFFERENCE, summarise
 
 if TYPE_CHECKING:
@@ -44,6 +43,7 @@ def read_run(folder: Path) -> PlayedRun:
     remedy = "give a results folder of ablate or evaluate"
     if not folder.is_dir():
         raise ConfigError(f"{folder} is no folder; {remedy}")
+    check_version(folder)
     content = read_json(folder / RESULTS_FILE, "results", remedy)
     command = content.get("command") if isinstance(content, dict) else None
     if command not in COMMANDS:
@@ -63,8 +63,7 @@ def _games(
     """The games of a run that count, and digests of the code that played them."""
     import pandas as pd
 
-    old = (folder / OLD_ROWS_FILE).exists()
-    path = folder / (OLD_ROWS_FILE if old else ROWS_FILE)
+    path = folder / ROWS_FILE
     try:
         lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
@@ -72,7 +71,7 @@ def _games(
     found: dict[tuple[Any, ...], Mapping[str, Any]] = {}
     keys: dict[tuple[Any, ...], str] = {}
     code = set()
-    for name, row, digest in (entry for line in lines for entry in (_old_row if old else _rows)(line)):
+    for name, row, digest in (entry for line in lines for entry in _rows(line)):
         if row["own"] != settings["own"] or row["opponent"] not in settings["opponents"] or row["seed"] not in seeds:
             continue
         if row["shielded"] is not shielded or (settings.get("covered") and row["covered"]):  # beside the state on
@@ -93,21 +92,8 @@ def _rows(line: str) -> list[tuple[str, Mapping[str, Any], str]]:
     return [] if entry is None else [(entry["job"], row, entry["code"]) for row in entry["rows"]]
 
 
-def _old_row(line: str) -> list[tuple[str, Mapping[str, Any], str]]:
-    """As 0.8.0 and before wrote it: a line holds the columns of one game, its key, code and sum."""
-    try:
-        entry = json.loads(line)
-        whole = isinstance(entry, dict) and entry.pop("sum", None) == job_id(entry)
-    except (ValueError, RecursionError):
-        return []
-    if not whole:
-        return []
-    entry.setdefault("net_captures", entry["captures"] - entry["captures_against"])
-    return [(entry["key"], entry, entry["code"])]
-
-
 def compare_runs(first: PlayedRun, second: PlayedRun, seed: int = 0) -> dict[str, Any]:
-    """Set a second run beside a first: ``compare`` in `docs_keys.KEYS`, but for where and when it was made.
+    """Set a second run beside a first: ``compare`` in `docs.KEYS`, but for where and when it was made.
 
     Raises:
         ConfigError: their games are no pairs: of other rules, or none from the same seed.

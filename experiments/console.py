@@ -21,23 +21,10 @@ from typer.core import TyperCommand, TyperOption
 
 from .cli_examples import EXAMPLES, MANY_OPTIONS, RARE
 from .cli_files import check_files, hints_of
-from .runner import Interrupted
+from .runner import Interrupted as Interrupted
 from .terminal import SafeConsole
 from .workers import JobFault, fault_words, interrupted_by_sigterm, machine_words
 
-__all__ = [
-    "App",
-    "ExitCode",
-    "Interrupted",
-    "PlainProgress",
-    "bars",
-    "command",
-    "err",
-    "finish",
-    "out",
-    "progress",
-    "say",
-]
 MAX_WIDTH = 100
 """Tables do not stretch over wider terminals."""
 EVERY_S = 30.0

@@ -9,6 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from jinja2 import Environment
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.foreign import visible
@@ -16,14 +17,17 @@ from steerclear.shield.renamed import current_settings
 
 from . import plots
 from .bench import bench_tables
+from .deploy.keys import DEPLOY, REFEREE, REPLAY
 from .docs_encounters import comparison_page
-from .docs_keys import KEYS
-from .markdown import MADE, goals_of, table
-from .metrics import RADII_M, breach_column
+from .encounters.attack import KEYS as ATTACK
+from .encounters.figures import KEYS as ENCOUNTERS
+from .markdown import MADE, table
+from .metrics import RADII_M, breach_column, game_metrics_of
+from .page import template
 from .reach.pages import played_page, sets_page, tables_page
 from .report import Report, Section, game_report, made_of
 from .tables import Table, interval_text
-from .tournament_pages import write_markdown
+from .tournament import write_markdown
 
 Results = Mapping[str, Any]
 Page = tuple[str, str, list[Path]]
@@ -127,7 +131,7 @@ def _page_of(content: Results, folder: Path) -> Page:
     command, settings = content.get("command"), content["settings"]
     if command == "bench":
         tables, made = Section("", bench_tables(content)), made_of(content)
-        return Report("Speed and memory", "", goals=goals_of(content), sections=[tables, made]).page("bench.md")
+        return Report("Speed and memory", "", goals=content["goals"], sections=[tables, made]).page("bench.md")
     if command == "tournament":
         return write_markdown(content, folder)
     # what was played under conditions is kept apart from the rest: ablation_aamas2024_delay0.3_current0.5
@@ -145,6 +149,31 @@ def _page_of(content: Results, folder: Path) -> Page:
 
 
 _KINDS = ("opponent", "teammate")
+
+
+def _keys() -> dict[str, dict[str, str]]:
+    metrics = game_metrics_of()
+    counted = [metric for metric in metrics if metric.kind not in ("percent", "least")]
+    text = Environment(trim_blocks=True, lstrip_blocks=True).from_string(template("json_keys.txt"))
+    keys: dict[str, dict[str, str]] = {}
+    for section in text.render(
+        meanings={metric.key: metric.meaning for metric in metrics},
+        columns={re.sub(r"_\d+\.\d+m$", "_*", metric.column): metric.meaning for metric in counted},
+        encounters=ENCOUNTERS,
+        attack=ATTACK,
+        deploy=DEPLOY,
+        referee=REFEREE,
+        replay=REPLAY,
+    ).split("\n## ")[1:]:
+        commands, *lines = section.strip().splitlines()
+        entries = dict(line.split(": ", 1) for line in lines if line)
+        shown, _, part = commands.rpartition(" of ")
+        keys |= {(f"{shown} of {name}" if shown else name): entries for name in part.split(", ")}
+    return keys
+
+
+KEYS = _keys()
+"""Meaning of each key of JSON by command, of ``templates/json_keys.txt``; ``rows of COMMAND``: of its rows' columns."""
 
 
 def keys_page() -> str:

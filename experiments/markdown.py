@@ -33,12 +33,14 @@ def table(heads: Sequence[str], rows: Sequence[Sequence[Any]]) -> list[str]:
     return [f"| {' | '.join(row)} |" for row in (body[0], ruler, *body[1:])]
 
 
+GOAL_HEADS = ["", "measured", "goal", ""]
+
+
+def goal_row(goal: Mapping[str, Any]) -> list[str]:
+    """Row of a table of goals: what was measured, what is asked, whether it is met."""
+    return [*goal_cells(goal), {True: "met", False: "**not met**", None: "no data"}[goal["met"]]]
+
+
 def goals_table(goals: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Lines of the table of goals: what was measured, what is asked, whether it is met."""
-    verdict = {True: "met", False: "**not met**", None: "no data"}
-    return table(["", "measured", "goal", ""], [[*goal_cells(goal), verdict[goal["met"]]] for goal in goals])
-
-
-def goals_of(content: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
-    """Goals of results, which those of 0.8.0 and before call bars."""
-    return content.get("goals") or content.get("bars") or ()
+    """Lines of the table of goals."""
+    return table(GOAL_HEADS, list(map(goal_row, goals)))

@@ -19,9 +19,9 @@ NO_GAME = (
     "shield/bridge/",
     "env/render/",
     "experiments/sim_boats/",
-    *(f"experiments/{name}.py" for name in ("docs", "docs_encounters", "docs_keys", "markdown", "page", "plots")),
+    *(f"experiments/{name}.py" for name in ("docs", "docs_encounters", "markdown", "page", "plots")),
     *(f"experiments/{name}.py" for name in ("report", "replay_html", "tables", "terminal")),
-    *(f"experiments/{name}" for name in ("cli", "console", "tournament_pages")),
+    *(f"experiments/{name}" for name in ("cli", "console")),
 )
 """How the names of files begin whose code changes no result that is kept on disk."""
 

@@ -1,4 +1,4 @@
-"""Rankings of a tournament: standings, who beats whom, what the shield costs each team, and the paper's ranks.
+"""Rankings of a tournament: standings, what the shield costs each team, the paper's ranks; their tables.
 
 All of it is made of `seats`: a line per team and game. The paper is that of the first International Maritime Capture
 the Flag Competition (2024).
@@ -8,64 +8,45 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from itertools import permutations
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from steerclear.shield.jit import Array
 
 from .play.spec import SIDES
-from .statistics import bootstrap_interval, count_interval, mean_interval, paired_ratio
+from .statistics import bootstrap_interval, mean_interval
+from .tables import Table, interval_text, number_text
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Row = Mapping[str, Any]
 RESAMPLES = 2000
-WEIGHTS = (0.25, 0.025)
-"""Both weights of a collision: the one that fits the paper's Table 3, and the one its rules name."""
 FIGURES = tuple(["captures", "grabs", "tags", "collisions", "hits_teammate", "hits_opponent"]) + tuple(
     f"{name}_against" for name in ("captures", "grabs", "tags")
 )
 CAPTURES, COLLISIONS, AGAINST = (FIGURES.index(name) for name in ("captures", "collisions", "captures_against"))
 GAME = ("blue", "red", "repetition")
-POPULATION = 50
-STRENGTHS = (0.1, 1.0, 10.0)
-"""Selection strengths that are looked at: a ranking that holds at all of them is no artefact of one."""
 KEPT = 0.95
 """Share of its own net captures that a shielded team is to keep."""
 
 
-class PaperRow(NamedTuple):
-    """A team of the paper: ours by that name, its figures in Table 3 (with the penalty) and Table 4 (without)."""
+PAPER = {
+    "lucas": (1, 4),
+    "ohto": (2, 12),
+    "alamer": (2, 12),
+    "meo": (3, 17),
+    "chao": (4, 11),
+    "richley": (5, 109),
+    "jin": (6, 226),
+    "crowley": (7, 183),
+    "leprell": (8, 153),
+}
+"""Rank and collisions of the paper's Table 3 (with the penalty), by the name that its team has here.
 
-    team: str
-    entrant: str
-    rank: int
-    score: float
-    collisions: int
-    rank_free: int
-    captures: int
-
-
-PAPER = (
-    PaperRow("Lucas-QMU", "lucas", 1, -1.0, 4, 6, 0),
-    PaperRow("Ohto-Indep", "ohto", 2, -3.0, 12, 6, 0),
-    PaperRow("Alamer-EJUST", "alamer", 2, -3.0, 12, 6, 0),
-    PaperRow("Meo-Indep", "meo", 3, -4.25, 17, 6, 0),
-    PaperRow("Chao-NIWC-PAC", "chao", 4, -6.75, 11, 4, 4),
-    PaperRow("Richley-NIWC-ATL", "richley", 5, -10.0, 109, 3, 15),
-    PaperRow("Jin-Indep", "jin", 6, -10.25, 226, 1, 31),
-    PaperRow("Crowley-BU-LL", "crowley", 7, -15.5, 183, 2, 19),
-    PaperRow("Leprell-USMA", "leprell", 8, -49.5, 153, 5, 0),
-)
-"""The learned ones (richley, jin, crowley, leprell) count here as soon as somebody enters them under these names."""
+The learned ones (richley, jin, crowley, leprell) count as soon as somebody enters them under these names.
+"""
 SCRIPTED = ("lucas", "ohto", "alamer", "meo", "chao")
-
-
-def paper_row(name: str) -> PaperRow | None:
-    """The paper's row of one of our teams, None where it has none."""
-    return next((row for row in PAPER if row.entrant == name), None)
 
 
 def seats(rows: Sequence[Row]) -> pd.DataFrame:
@@ -159,7 +140,6 @@ def standings(totals: Totals, penalty: float, seed: int) -> list[dict[str, Any]]
     found: dict[str, Any] = {
         "rank": ranks_of(sums, penalty).astype(int),
         "score": score_of(sums, penalty),
-        **{f"score_{weight:g}": score_of(sums, weight) for weight in WEIGHTS},
         "net_captures": score_of(sums, 0.0),
         "rank_free": ranks_of(sums, 0.0).astype(int),
         **dict(zip(FIGURES, sums.T, strict=True)),
@@ -185,100 +165,19 @@ def state_results(table: pd.DataFrame, state: str, teams: Sequence[str], penalty
     mine = table[table["state"] == state] if len(table) else table
     playing = [team for team in teams if len(mine) and (mine["team"] == team).any()]
     totals = Totals.of(mine, playing)
-    wins = win_matrix(totals, penalty)
     return {
         "state": state,
         "games": len(mine) // 2,
         "repetitions": totals.repetitions,
         "standings": standings(totals, penalty, seed) if playing else [],
-        "teams": playing,
-        "wins": wins.tolist(),
-        "alpha_rank": {f"{k:g}": alpha_rank(wins, k).tolist() for k in STRENGTHS} if playing else {},
-        "cycles": cycles(wins, playing),
     }
-
-
-def qualifying_table(
-    table: pd.DataFrame, states: Sequence[str], teams: Sequence[str], penalty: float
-) -> list[dict[str, Any]]:
-    """Mean primary score per game of each team in each state, best first; each is scored by its own games alone."""
-    found: list[dict[str, Any]] = []
-    own = table[table["examined"] == table["side"]] if len(table) else table
-    for state in states:
-        lines = []
-        for team in teams if len(own) else ():
-            games = own[(own["state"] == state) & (own["team"] == team)]
-            if len(games):
-                score = float((games["net_captures"] - penalty * games["collisions"]).mean())
-                line = {"team": team, "state": state, "games": len(games), "score": score}
-                lines.append(line | {"captures": int(games["captures"].sum())})
-        found += sorted(lines, key=lambda line: -line["score"])
-    return found
-
-
-def win_matrix(totals: Totals, penalty: float) -> Array:
-    """(teams, teams) share of their games that the row's team won against the column's, a draw counting half.
-
-    NaN on the diagonal and for pairs that have not met.
-    """
-    n = len(totals.teams)
-    wins, games = np.zeros((n, n)), np.zeros((n, n))
-    for pair, values in zip(totals.strata, totals.values, strict=True):
-        i, j = (totals.teams.index(name) for name in pair)
-        scored = values[..., CAPTURES] - penalty * values[..., COLLISIONS]
-        lead = scored[:, i] - scored[:, j]
-        won = float((lead > 1e-9).sum() + 0.5 * (np.abs(lead) <= 1e-9).sum())
-        wins[[i, j], [j, i]] += won, len(lead) - won
-        games[[i, j], [j, i]] += len(lead)
-    with np.errstate(invalid="ignore"):
-        return np.asarray(np.where(games > 0, wins / games, np.nan))
-
-
-def alpha_rank(wins: Array, strength: float, population: int = POPULATION) -> Array:
-    """Share of time that evolving players spend on each team (Omidshafiei et al. 2019, arXiv 1903.01373).
-
-    One population whose members all play one team but for a mutant; the mutant takes over with the Moran process'
-    fixation probability of its payoff against the residents', and the chain's stationary distribution is the ranking.
-
-    Args:
-        wins: (n, n) payoffs of the row against the column.
-        strength: of selection, per unit of payoff.
-        population: members.
-    """
-    n = len(wins)
-    payoffs = np.where(np.isfinite(wins), wins, 0.5)
-    chain = np.zeros((n, n))
-    for resident, mutant in permutations(range(n), 2):
-        gain = payoffs[mutant, resident] - payoffs[resident, mutant]
-        chain[resident, mutant] = _fixation(strength * gain, population) / (n - 1)
-    np.fill_diagonal(chain, 1.0 - chain.sum(axis=1))
-    # the stationary distribution: pi (P - I) = 0 with shares that add up to 1
-    system = np.vstack([chain.T - np.eye(n), np.ones(n)])
-    found = np.linalg.lstsq(system, np.r_[np.zeros(n), 1.0], rcond=None)[0]
-    return np.asarray(np.clip(found, 0.0, None) / np.clip(found, 0.0, None).sum())
-
-
-def _fixation(advantage: float, population: int) -> float:
-    """Probability that a mutant takes over; ``1 / population`` without an advantage."""
-    if abs(advantage) < 1e-9:
-        return 1.0 / population
-    return float(np.expm1(-advantage) / np.expm1(-population * advantage)) if advantage > -14.0 else 0.0
-
-
-def cycles(wins: Array, teams: Sequence[str]) -> list[str]:
-    """Three teams each of which beats the next."""
-    return [
-        f"{teams[i]} beats {teams[j]} beats {teams[k]} beats {teams[i]}"
-        for i, j, k in permutations(range(len(teams)), 3)
-        if i == min(i, j, k) and wins[i, j] > 0.5 and wins[j, k] > 0.5 and wins[k, i] > 0.5
-    ]
 
 
 def prices(table: pd.DataFrame, teams: Sequence[str], off: str, on: str, seed: int) -> list[dict[str, Any]]:
     """What the shield costs each team and what it brings, from games (`seats`) of two states from the same seeds.
 
     Returns:
-        Per team the figures of ``prices[]`` in `docs_keys.KEYS`.
+        Per team the figures of ``prices[]`` in `docs.KEYS`.
     """
     if table.empty:
         return []
@@ -295,19 +194,15 @@ def _price(team: str, pairs: pd.DataFrame, seed: int) -> dict[str, Any]:
     means = {name: float(pairs[name].mean()) if len(pairs) else None for name in columns}
     captured = bool(net.any() or pairs[["captures_off", "captures_on"]].any(axis=None))
     judged = pairs.dropna(subset=["avoidable_on"])
-    found, hits = int(judged["avoidable_on"].sum()), int(judged["hits_on"].sum())
     return {
         "team": team,
         "games": len(pairs),
         **means,
         **{name: asdict(mean_interval(values, seed)) for name, values in change.items()},
-        "captures_kept": asdict(paired_ratio(pairs["captures_off"], pairs["captures_on"], seed)),
         "kept": keeps(net) if captured else None,
         "margin": asdict(bootstrap_interval(net, _margin, seed)),
         "judged": len(judged),
-        "avoidable": found if len(judged) else None,
-        "avoidable_per_game": asdict(count_interval(found, len(judged))) if len(judged) else None,
-        "avoidable_share": found / hits if hits else None,
+        "avoidable": int(judged["avoidable_on"].sum()) if len(judged) else None,
     }
 
 
@@ -320,3 +215,56 @@ def _margin(net: Array) -> Array:
     """Net captures per game above what is to be kept, from (..., games, [off, on])."""
     off, on = np.moveaxis(net.mean(axis=-2), -1, 0)
     return np.asarray(on - off + (1.0 - KEPT) * np.abs(off))
+
+
+def shown(state: str) -> str:
+    """A state in words."""
+    return {"off": "no shields", "all": "all shielded"}.get(state, f"{state} shielded")
+
+
+def all_tables(results: Mapping[str, Any]) -> list[Table]:
+    """What the shield costs each team and brings it, then the standings of each state beside the paper's."""
+    tables = []
+    if results["prices"]:
+        rows = [
+            [
+                one["team"],
+                *(number_text(one[f"net_captures_{state}"]) for state in ("off", "on")),
+                interval_text(one["net_captures"]),
+                kept_words(one),
+                *(number_text(one[f"hits_{state}"]) for state in ("off", "on")),
+                interval_text(one["hits"]),
+                "-" if one["avoidable"] is None else f"{one['avoidable']} in {one['judged']}",
+            ]
+            for one in results["prices"]
+        ]
+        heads = ["team", "net captures", "shielded", "change, paired", "keeps 95 %"]
+        heads += ["hits", "shielded", "change, paired", "avoidable, in judged games"]
+        tables.append(Table("Price of safety, a game", heads, rows, numbers=False))
+    figures = ("rank", "score", "collisions", "net_captures")
+    heads = ["team", "rank", "score", "collisions", "net captures", "hits of mates", "of opponents"]
+    heads += ["paper: rank", "collisions"]
+    for state in results["states"]:
+        rows = [
+            [
+                one["team"],
+                *(interval_text({part: one[name + end] for part, end in _PARTS.items()}) for name in figures),
+                *(number_text(float(one[f"hits_{kind}"])) for kind in ("teammate", "opponent")),
+                *map(str, PAPER.get(one["team"], ("-", "-"))),
+            ]
+            for one in state["standings"]
+        ]
+        if rows:
+            tables.append(Table(f"Standings, {shown(state['state'])}", heads, rows, numbers=False))
+    return tables
+
+
+_PARTS = {"value": "", "low": "_low", "high": "_high"}
+
+
+def kept_words(one: Row) -> str:
+    """Whether net captures are kept; "unsure" where too few, but the interval reaches what is to be kept."""
+    if one["kept"] is not False:
+        return "yes" if one["kept"] else "-"
+    high = one["margin"]["high"]
+    return "unsure" if high is not None and high >= 0.0 else "no"

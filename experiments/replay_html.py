@@ -84,8 +84,8 @@ class Packer:
         self.add_codes(name, codes, against, offset=0.0, scale=FULL_TURN_DEG / (LAST_CODE + 1))
 
 
-def pack(record: Record, title: str, compress: bool = True) -> dict[str, Any]:
-    """Pack a record, JSON-ready; without ``compress`` a page needs no newer browser but is some three times as large.
+def pack(record: Record, title: str) -> dict[str, Any]:
+    """Pack a record, JSON-ready.
 
     Raises:
         TraceError: the record is incomplete.
@@ -119,8 +119,7 @@ def pack(record: Record, title: str, compress: bool = True) -> dict[str, Any]:
         "columns": packer.columns,
         "breaches": np.round(record["breaches"], 3).tolist(),
         "captures": score_changes(record["captures"]),
-        "deflated": compress,
-        "data": base64.b64encode(zlib.compress(content, 9) if compress else content).decode(),
+        "data": base64.b64encode(zlib.compress(content, 9)).decode(),
     }
 
 
@@ -153,13 +152,11 @@ def write_replay(
     records: Record | Sequence[Record],
     path: str | os.PathLike[str],
     title: str = "steerclear replay",
-    compress: bool = True,
 ) -> Path:
     """Write a replay of one record or several.
 
     Several games can be chosen from a list and shown side by side, scrubbed together; the first two are shown
-    at the start. A link to ``replay.html#t=12.5`` opens it at that time. Without ``compress`` the file is larger but
-    opens in browsers older than 2023, too.
+    at the start. A link to ``replay.html#t=12.5`` opens it at that time.
 
     Raises:
         TraceError: a record is incomplete.
@@ -171,7 +168,7 @@ def write_replay(
     metas = [read_meta(game) for game in games]
     own, names = {"own_team": own_team(metas)}, [game_title(meta) for meta in metas]
     titles = [name if names.count(name) == 1 else f"{k}. {name}" for k, name in enumerate(names, start=1)]
-    packed = [pack(game, name, compress) | own for game, name in zip(games, titles, strict=True)]
+    packed = [pack(game, name) | own for game, name in zip(games, titles, strict=True)]
     data = as_json({"games": packed})
     return write_page(path, render("replay.html", title=title, data=data, scripts=SCRIPTS, sources=SCRIPT_SOURCES))
 

@@ -11,14 +11,14 @@ from typing import Any, NamedTuple
 from markupsafe import Markup
 
 from . import plots
-from .markdown import MADE, goals_of, goals_table, line, table
+from .markdown import MADE, goals_table, line, table
 from .metrics import RADII_M, REASONS, breach_column, game_metrics_of
 from .page import render, write_page
 from .play.conditions import words_of
-from .tables import COVERED_WORDS, Table, columns_of, goal_cells, interval_text, limits_text, number_text
+from .tables import COVERED_WORDS, columns_of, goal_cells, interval_text, limits_text, number_text
+from .tables import Table as Table
 from .verdicts import COVERED, HEADS, OFF, ON, state_of, verdict_rows
 
-__all__ = ["Plot", "Report", "Section", "Table", "Tile"]
 Summary = Mapping[str, Any]
 SHIELDS = ((OFF, "shield off"), (ON, "shield on"), (COVERED, "shield on, covering boats that the game drives"))
 MOST_ROWS, MOST_BREACHES = 600, 200
@@ -188,7 +188,7 @@ def game_report(results: Mapping[str, Any]) -> Report:
         warnings=results.get("warnings") or (),
         tiles=_tiles(pairings, separation_m),
         links=results.get("replays") or (),
-        goals=goals_of(results),
+        goals=results.get("goals") or (),
         plots=_plots(pairings, games, separation_m) if games else (),
         notes=[NOTE, *([OF_AN_ENTRY] if settings.get("zip_file") else [])],
         sections=[

@@ -17,7 +17,6 @@ Contract:
   of other settings stay in the file and count for nothing.
 * Ctrl-C ends `execute` with what is there: ``run.interrupted`` is true, so that the command still writes its results.
 * One process writes into a folder at a time, as long as its `Run` lives.
-* A second `execute` into the same folder (``resume=True``) adds jobs, such as the final after the qualifying.
 """
 
 from __future__ import annotations
@@ -220,12 +219,8 @@ def _check_folder(folder: Path, command: str, resume: bool) -> None:
     for name in (EXPERIMENT_FILE, ROWS_FILE, RESULTS_FILE):
         if (folder / name).exists() and not (folder / name).is_file():  # a pipe would be read for ever
             raise ConfigError(f"{folder / name} is no plain file; move it away or choose another --out")
-    found, version = _whose(folder)
-    if (folder / OLD_ROWS_FILE).exists():
-        raise ConfigError(
-            f"{folder} holds results of steerclear {version or '0.8.0 or earlier'}, which this version reads (compare, "
-            "docs) but does not go on with; choose another --out"
-        )
+    check_version(folder)
+    found, _ = _whose(folder)
     rows = folder / ROWS_FILE
     held = (rows.exists() and rows.stat().st_size > 0) or (folder / RESULTS_FILE).exists()
     if held and not resume:
@@ -235,6 +230,14 @@ def _check_folder(folder: Path, command: str, resume: bool) -> None:
     for name in () if resume else BESIDE:
         if (folder / name).exists():
             raise ConfigError(f"{folder / name} would be written over; choose another --out, or move it")
+
+
+def check_version(folder: Path) -> None:
+    """Refuse (ConfigError) a folder of results of an earlier version, of which only ``docs`` reads results.json."""
+    if (folder / OLD_ROWS_FILE).exists():
+        version = _whose(folder)[1] or "0.8.0 or earlier"
+        words = "whose games this version does not read; make them again, or choose another folder"
+        raise ConfigError(f"{folder} holds results of steerclear {version}, {words}")
 
 
 def _whose(folder: Path) -> tuple[str | None, str | None]:

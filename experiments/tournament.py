@@ -1,24 +1,30 @@
-"""A tournament: every pair of teams on both sides, without shields and with them, and a qualifying before."""
+"""A tournament: every pair of teams on both sides, without shields and with them; its games, results and report."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+import base64
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from io import BytesIO
 from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from markupsafe import Markup
 from steerclear import policies
 from steerclear.shield.exceptions import ConfigError
 
+from . import plots
 from .game_metrics import DEFAULT_PENALTY, tally
 from .metrics import RADII_M, breach_column, judged
-from .play.match import Match, MatchResult
+from .play.match import Match, MatchResult, play_again
 from .play.spec import ANSWER_S, SIDES, MatchSpec, near
-from .rankings import SCRIPTED, prices, qualifying_table, seats, state_results
+from .rankings import KEPT, SCRIPTED, all_tables, prices, seats, shown, state_results
+from .replay_html import write_replay
+from .report import Plot, Report, Section, made_of
 from .result_files import table_name
-from .runner import RESULTS_FILE, Experiment, Notice, Run, execute
+from .runner import RESULTS_FILE, Experiment, Run
 from .warming import compile_game, compile_judge, compile_shield
 from .workers import Job, Row, Workers
 
@@ -26,11 +32,15 @@ if TYPE_CHECKING:
     import pandas as pd
 
 OFF, ALL = "off", "all"
-FINAL, QUALIFYING = "final", "qualifying"
-EXAMINERS = ("easy", "medium", "hidden", "hidden", "hidden")
-"""Opponents of the qualifying; of the hidden team all three compositions."""
 NEVER_GRAB = ("ohto", "alamer")
 KINDS = ("teammate", "opponent")
+TITLE = "The competition, with the shield and without"
+NOTE = (
+    "Standings are per double round robin (every pair once on each side), prices per game; brackets are 95 % "
+    "intervals, of standings by a bootstrap that draws repetitions anew within each pair and side. The paper's scores "
+    "fit no single penalty, so its ranks are compared, not its scores."
+)
+Results = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -42,8 +52,6 @@ class TournamentSettings:
         states: which teams are shielded: "off", "all", or names with commas; each state plays all games.
         repetitions: times each pair meets on each side.
         seed: repetition r is played from seed + r, in all pairs, on both sides and in all states.
-        qualifying: play it.
-        finalists: how many teams of the qualifying go on; None for all.
 
     Raises:
         ConfigError: fewer than two teams, equal names, an unknown team in a state, or a number out of range.
@@ -54,8 +62,6 @@ class TournamentSettings:
     states: tuple[str, ...] = (OFF, ALL)
     repetitions: int = 1
     seed: int = 0
-    qualifying: bool = False
-    finalists: int | None = None
     penalty: float = DEFAULT_PENALTY
     judge: str = "shielded"
     shield: Mapping[str, Any] = field(default_factory=dict)
@@ -70,8 +76,6 @@ class TournamentSettings:
             raise ConfigError(f"--teams are {', '.join(names) or 'none'}; give two or more of different names")
         if not 1 <= self.repetitions <= 10_000:
             raise ConfigError(f"--repetitions must be 1 to 10,000; got {self.repetitions:,}")
-        if self.finalists is not None and not (self.qualifying and 2 <= self.finalists <= len(names)):
-            raise ConfigError(f"--finalists goes with --qualifying and is 2 to {len(names)}; got {self.finalists}")
         for name in (name for state in self.states for name in shielded_in(state, names)):
             if name not in names:
                 raise ConfigError(f"--shield names {name!r}, which does not play; {near(name, [OFF, ALL, *names])}")
@@ -89,42 +93,33 @@ class TournamentSettings:
         return float(self.shield.get("separation_m", RADII_M[0]))
 
     @property
-    def expected(self) -> int:
-        """Games there are to play, all in all."""
-        qualifying = len(self.qualifying_games()) if self.qualifying else 0
-        return qualifying + len(self.final(self.teams[: self.finalists]))
+    def compared(self) -> tuple[str, str] | None:
+        """The states that are set beside each other: off, and all or the first other; None without both."""
+        others = [state for state in self.states if state != OFF]
+        return (OFF, ALL if ALL in others else others[0]) if OFF in self.states and others else None
 
-    def final(self, teams: Sequence[str]) -> list[Job]:
-        """All games of the final: every repetition of every pair on both sides, the states of a game side by side."""
-        return [
-            self._job(FINAL, state, blue, red, repetition, repetition)
+    def experiment(self) -> Experiment:
+        """Every repetition of every pair on both sides, the states of a game side by side."""
+        jobs = [
+            self._job(state, blue, red, repetition)
             for repetition in range(self.repetitions)
-            for pair in combinations(teams, 2)
+            for pair in combinations(self.teams, 2)
             for blue, red in (pair, pair[::-1])
             for state in self.states
         ]
+        warm = (compile_game, compile_shield, compile_judge)
+        return Experiment("tournament", asdict(self), jobs, play_game, "games", warm)
 
-    def qualifying_games(self) -> list[Job]:
-        """Every team against the organisers' opponents, on both sides."""
-        hidden = EXAMINERS.index("hidden")  # that team chooses its composition by the number of the game
-        return [
-            self._job(QUALIFYING, state, *teams, max(number - hidden, 0), number, side)
-            for team in self.teams
-            for number, examiner in enumerate(EXAMINERS)
-            for side, teams in zip(SIDES, ((team, examiner), (examiner, team)), strict=True)
-            for state in self.states
-        ]
-
-    def _job(self, phase: str, state: str, blue: str, red: str, game: int, turn: int, examined: str = "") -> Job:
-        """One game; the own team of its spec is blue, ``examined`` the side whose qualifying game it is."""
+    def _job(self, state: str, blue: str, red: str, repetition: int) -> Job:
+        """One game; the own team of its spec is blue."""
         shielded = shielded_in(state, self.labels)
         covers = [dict(self.shield) if label(team) in shielded else None for team in (blue, red)]
         names = ("preset", "fixed_start", "penalty", "judge", "trust", "answer_s")
         spec = MatchSpec(
             own=blue,
             opponent=red,
-            game=game,
-            seed=self.seed + turn,
+            game=repetition,
+            seed=self.seed + repetition,
             shield=covers[0],
             opponent_shield=covers[1],
             rules=dict(self.rules),
@@ -132,8 +127,7 @@ class TournamentSettings:
             files=(policies.fingerprint(blue), policies.fingerprint(red)),
             **{name: getattr(self, name) for name in names},
         )
-        about = {"phase": phase, "state": state, "examined": examined, "separation_m": self.separation_m}
-        return {**about, **spec.as_job()}
+        return {"state": state, "separation_m": self.separation_m, **spec.as_job()}
 
 
 def label(team: str) -> str:
@@ -151,38 +145,13 @@ def shielded_in(state: str, teams: Sequence[str]) -> tuple[str, ...]:
     return tuple(teams) if state == ALL else tuple(name.strip() for name in state.split(",") if name.strip())
 
 
-def quick(settings: TournamentSettings, max_time_s: float) -> TournamentSettings:
-    """The small version: short games, once each."""
-    return replace(settings, repetitions=1, rules={"max_time_s": max_time_s, **settings.rules})
-
-
-def play(
-    settings: TournamentSettings,
-    folder: Path,
-    workers: Workers,
-    resume: bool,
-    notice: Notice = lambda done, of: None,
-    tell: Callable[[str], None] = lambda words: None,
-) -> Run:
-    """Play a tournament into a folder (see `runner.execute`): the qualifying, then the final of those that go on."""
-    warm = (compile_game, compile_shield, compile_judge)
-    first = settings.qualifying_games() if settings.qualifying else settings.final(settings.teams)
-    experiment = Experiment("tournament", asdict(settings), first, play_game, "games", warm)
-    run = execute(experiment, folder, workers, resume, notice, tell)
-    if not settings.qualifying or run.interrupted or run.failed:
-        return run
-    final = settings.final(finalists(seats(run.rows), settings))
-    whole = execute(replace(experiment, jobs=[*first, *final]), folder, workers, True, notice, lambda words: None)
-    return replace(whole, resumed=whole.resumed - len(run.rows) + run.resumed, wall_s=whole.wall_s + run.wall_s)
-
-
 def play_game(job: Job) -> list[Row]:
-    """Play a game; its row, ``rows of tournament`` in `docs_keys.KEYS`; SteerclearError where it is unusable."""
+    """Play a game; its row, ``rows of tournament`` in `docs.KEYS`; SteerclearError where it is unusable."""
     match = Match(MatchSpec.of_job(job))
     try:
         result = match.play()
         played = {name: result.row[name] for name in ("preset", "steps", "duration_s", "wall_s")}
-        about = {**names_of(job), "examined": job["examined"], "seed": job["seed"], **played}
+        about = {**names_of(job), "seed": job["seed"], **played}
         sides = (_counts(match, result, job["separation_m"], team) for team in (0, 1))
         both = zip(SIDES, sides, strict=True)
         return [about | {f"{side}_{name}": value for side, counts in both for name, value in counts.items()}]
@@ -193,7 +162,7 @@ def play_game(job: Job) -> list[Row]:
 def names_of(job: Mapping[str, Any]) -> dict[str, Any]:
     """What a game is called."""
     teams = {"blue": label(job["own"]), "red": label(job["opponent"])}
-    return {"phase": job["phase"], "state": job["state"], **teams, "repetition": job["game"]}
+    return {"state": job["state"], **teams, "repetition": job["game"]}
 
 
 def _counts(match: Match, result: MatchResult, separation_m: float, team: int) -> dict[str, Any]:
@@ -221,45 +190,23 @@ def _counts(match: Match, result: MatchResult, separation_m: float, team: int) -
 
 
 def results_of(run: Run, settings: TournamentSettings) -> dict[str, Any]:
-    """The content of results.json; `docs_keys.KEYS` describes it."""
-    table = seats(run.rows)
-    final, before = (table[table["phase"] == phase] if len(table) else table for phase in (FINAL, QUALIFYING))
-    teams, penalty, seed, compared = settings.labels, settings.penalty, settings.seed, compared_states(settings)
-    playing = [team for team in teams if len(final) and (final["team"] == team).any()]
-    priced = [] if compared is None else prices(final, playing, *compared, seed)
-    goals = _goals(final, priced)
+    """The content of results.json; `docs.KEYS` describes it."""
+    table, compared, seed = seats(run.rows), settings.compared, settings.seed
+    playing = [team for team in settings.labels if len(table) and (table["team"] == team).any()]
+    priced = prices(table, playing, *compared, seed) if compared and playing else []
+    goals = _goals(table, priced)
     return {
         **run.head(),
-        "complete": len(run.rows) == settings.expected,
         "failed": [{**names_of(job), "error": job["error"], "fault": job["fault"]} for job in run.failed],
         "games_played": len(run.rows),
         "games_resumed": run.resumed,
         "warnings": warnings_of(table),
         "silent": silent_teams(table),
-        "qualifying": qualifying_table(before, settings.states, teams, penalty),
-        "states": [state_results(final, state, teams, penalty, seed) for state in settings.states],
+        "states": [state_results(table, state, settings.labels, settings.penalty, seed) for state in settings.states],
         "prices": priced,
         "goals": goals,
-        "deprecated": {"bars": goals},
         "files": {"results": RESULTS_FILE, **({"games": table_name()} if run.rows else {})},
     }
-
-
-def finalists(table: pd.DataFrame, settings: TournamentSettings) -> tuple[str, ...]:
-    """The teams that go on, as given on the command line: the best of the qualifying (`seats`) in the first state."""
-    if settings.finalists is None:
-        return settings.teams
-    ranked = qualifying_table(table, settings.states[:1], settings.labels, settings.penalty)
-    best = {line["team"] for line in ranked[: settings.finalists]}
-    return tuple(team for team in settings.teams if label(team) in best)
-
-
-def compared_states(settings: TournamentSettings) -> tuple[str, str] | None:
-    """The states that are set beside each other: off, and all or the first other; None without both."""
-    others = [state for state in settings.states if state != OFF]
-    if OFF not in settings.states or not others:
-        return None
-    return OFF, ALL if ALL in others else others[0]
 
 
 def warnings_of(table: pd.DataFrame) -> list[str]:
@@ -297,6 +244,98 @@ def _goals(table: pd.DataFrame, priced: Sequence[Mapping[str, Any]]) -> list[dic
         goals.append(judged("avoidable hits of shielded teams, all games", found, "<=", 0.0))
     kept = [line["kept"] for line in priced if line["kept"] is not None]
     if kept:
-        name = "teams that keep 95 % of their net captures, of those shielded"
+        name = f"teams that keep {100 * KEPT:g} % of their net captures, of those shielded"
         goals.append(judged(name, float(sum(kept)), ">=", float(len(kept))))
     return goals
+
+
+def subtitle(results: Results) -> str:
+    """What was played, in a line."""
+    settings = results["settings"]
+    length, repetitions = (settings["rules"] or {}).get("max_time_s"), settings["repetitions"]
+    there = (
+        f"{shown(state['state'])} {state['games']} games, repetitions of every pair that met: {state['repetitions']}"
+        for state in results["states"]
+    )
+    return (
+        f"{settings['preset']}, {results['games_played']} games"
+        + (f" of {length:g} s" if length else "")
+        + f", {repetitions} repetition{'' if repetitions == 1 else 's'} of every pair on both sides in every state, "
+        + f"seeds {settings['seed']} to {settings['seed'] + repetitions - 1}, penalty {settings['penalty']:g}, "
+        + f"steerclear {results['versions']['steerclear']}"
+        + ("" if results["complete"] else f"; not complete: {'; '.join(there)}")
+    )
+
+
+def draw(results: Results, target: Any) -> Any:
+    """Draw net captures against collisions of every team, a panel a state, as PNG into a file."""
+    panels = [
+        (
+            shown(state["state"]),
+            [
+                (one["team"], one["collisions"], one["net_captures"], one["net_captures_high"] or one["net_captures"])
+                for one in state["standings"]
+            ],
+        )
+        for state in results["states"]
+        if state["standings"]
+    ]
+    return plots.png(plots.scatter(panels, ("collisions", "net captures, per double round robin")), target)
+
+
+def _report(results: Results, **more: Any) -> Report:
+    sections = [Section("", all_tables(results)), made_of(results)]
+    about = {"warnings": results["warnings"], "goals": results["goals"], "notes": [NOTE], "sections": sections}
+    return Report(TITLE, subtitle(results), **about, **more)
+
+
+def write_html(results: Results, path: Path, replays: Sequence[Mapping[str, str]] = ()) -> Path:
+    """Write the report of results.json, with ``label`` and ``path`` of each replay; ConfigError where it cannot be."""
+    draw(results, buffer := BytesIO())
+    source = f"data:image/png;base64,{base64.b64encode(buffer.getvalue()).decode()}"
+    image = Markup(f'<img alt="net captures against collisions" style="max-width:100%" src="{source}">')
+    return _report(results, links=replays, plots=[Plot("What the shield changes for each team", image)]).write(path)
+
+
+def write_markdown(results: Results, folder: Path) -> tuple[str, str, list[Path]]:
+    """The documentation page: its name, its text, and the figure written beside it."""
+    stem = f"tournament_{results['settings']['preset']}"
+    return _report(results).page(f"{stem}.md", draw(results, folder / f"{stem}.png"))
+
+
+def most_changed(run: Run, states: tuple[str, str] | None) -> tuple[str, list[Job]] | None:
+    """The game that the shield changed most, in words, and its jobs off and on; of one state that with most hits."""
+    games: dict[tuple[Any, ...], dict[str, Row]] = {}
+    for row in run.rows:
+        games.setdefault((row["blue"], row["red"], row["repetition"]), {})[row["state"]] = row
+    first, second = states or (run.rows[0]["state"],) * 2 if run.rows else ("", "")
+    pairs = {game: (rows[first], rows[second]) for game, rows in games.items() if {first, second} <= set(rows)}
+    if not pairs:
+        return None
+
+    def worth(game: tuple[Any, ...]) -> float:
+        (hits, captures), (hits_on, captures_on) = map(_score, pairs[game])
+        return abs(hits - hits_on) + 2 * abs(captures - captures_on) if states else hits
+
+    blue, red, repetition = chosen = max(pairs, key=worth)
+    jobs = {(job["state"], *list(names_of(job).values())[1:]): job for job in run.experiment.jobs}
+    words = f"{'most changed by the shield' if states else 'most hits'} ({blue} against {red}, repetition {repetition})"
+    return words, [jobs[(state, *chosen)] for state in dict.fromkeys((first, second))]
+
+
+def _score(row: Row) -> tuple[float, float]:
+    """Hits and captures of both sides."""
+    hits = row["blue_hits_teammate"] + row["red_hits_teammate"] + row["blue_hits_opponent"]
+    return float(hits), float(row["blue_captures"] + row["red_captures"])
+
+
+def write_most_changed(run: Run, settings: TournamentSettings, workers: Workers) -> list[dict[str, str]]:
+    """Play `most_changed` again and write its replay; its label and file name, none where it cannot be played."""
+    words, jobs = most_changed(run, settings.compared) or ("", [])
+    specs = [MatchSpec.of_job(job) for job in jobs]
+    played = play_again(specs, workers)
+    games = [played[spec.key].record for spec in specs if spec.key in played]
+    if not games:
+        return []
+    write_replay(games, run.folder / "replay.html", title=f"Tournament, {words}")
+    return [{"label": words, "path": "replay.html"}]

@@ -87,7 +87,7 @@ def judge_game(
         motion: the current that carried the boats, and how late their commands came.
 
     Returns:
-        Per breach, in order of time, the entries of ``breaches[]`` in `docs_keys.KEYS`.
+        Per breach, in order of time, the entries of ``breaches[]`` in `docs.KEYS`.
     """
     meta = read_meta(record)
     team = np.asarray(meta["team"])
@@ -122,8 +122,7 @@ def _judged(
     if both is None:
         empty = ("last_preventable_s", "other_last_preventable_s", "exhausted", "responsible")
         return {"verdict": NOT_JUDGED, **dict.fromkeys(empty), "responsible_boats": []}
-    ours = [both.of(boat) for boat in own]
-    best = max(ours, key=lambda verdict: -1 if verdict.last_step is None else verdict.last_step)
+    ours, (best, side) = [both.of(boat) for boat in own], own_side(both, own)
     theirs = [verdict.last_preventable_s for verdict in (both.first, both.second) if verdict.own not in own]
     could = [verdict for verdict in ours if verdict.outcome is Outcome.AVOIDABLE]
     nobody = bool(could) and all(helpless(verdict, disabled) for verdict in could)
@@ -132,17 +131,19 @@ def _judged(
         "last_preventable_s": None if nobody else best.last_preventable_s,
         "other_last_preventable_s": theirs[0] if theirs else None,
         "exhausted": all(verdict.exhausted for verdict in ours),
-        "responsible": _side(both, own),
+        "responsible": side,
         "responsible_boats": [agent_ids[boat] for boat in both.responsible_boats()],
     }
 
 
-def _side(both: BreachVerdict, own: Sequence[int]) -> str:
-    """Name the responsible side as the team sees it: own, opponent, both, game, neither or start."""
+def own_side(both: BreachVerdict, own: Sequence[int]) -> tuple[Verdict, str]:
+    """The verdict on the own boat that could act the longest, and who is responsible: one of `SIDES`."""
+    ours = [verdict for verdict in (both.first, both.second) if verdict.own in own]
+    best = max(ours, key=lambda verdict: -1 if verdict.last_step is None else verdict.last_step)
     if both.responsible in (Responsible.GAME, Responsible.NEITHER, Responsible.START):
-        return both.responsible.value
+        return best, both.responsible.value
     inside = [boat in own for boat in both.responsible_boats()]
-    return "own" if all(inside) else "both" if any(inside) else "opponent"
+    return best, "own" if all(inside) else "both" if any(inside) else "opponent"
 
 
 AVOIDABLE = Outcome.AVOIDABLE.value

@@ -9,11 +9,9 @@ import numpy as np
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import ConfigError, FleetError
 from steerclear.shield.fleet import LARGEST
-from steerclear.shield.jit import Array, BoolArray, IntArray
+from steerclear.shield.jit import Array, BoolArray, IntArray, kernel
 from steerclear.shield.platforms import Platform, get_platform
 from steerclear.shield.platforms import layout as L
-
-from ..jit import kernel
 
 
 class Games(NamedTuple):

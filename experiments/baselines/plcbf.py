@@ -18,7 +18,7 @@ What the paper leaves to the user, and what stands here:
 | inputs u | acceleration and turn rate as shares of braking and of the largest turn now, as the textbook filters have |
 | dV_m/dt | the step of the sampled boat, (V_m(x+) - V_m(x)) / dt, x+ by hull and autopilot, others one step on |
 | its gradient in u | finite differences of V_m(x+) by `DIFFERENCE` of each input |
-| least invasive | the row that leaves the largest part of the inputs, as in the authors' code; or the nearest answer |
+| least invasive | the row that leaves the largest part of the inputs, as in the authors' code |
 | several agents | opponents hold course; teammates hold what they were told last, or in this step if decided for |
 """
 
@@ -28,12 +28,11 @@ import math
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from steerclear.shield.jit import Array
+from steerclear.shield.jit import Array, kernel
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.step import step_boat
 from steerclear.shield.platforms.usv import wrap_degrees
 
-from ..jit import kernel
 from . import rollouts as R
 from .active_set import OPTIMAL, project
 from .base import Games, game_of
@@ -159,10 +158,10 @@ def take_mode(
 ) -> tuple[int, float, float]:
     """The mode taken, its row (written), right-hand side and value; safe ones first, by how little they take, then V.
 
-    What a mode leaves is the share of the inputs in which its row holds, or less the change of the nominal ones.
+    What a mode leaves is the share of the inputs in which its row holds.
     """
-    z0, later, trial, z, values = inputs.z0, np.empty((4, L.N_STATE)), np.empty(2), np.empty(2), np.empty(4)
-    shift, most = _later_states(setup, i, state, inputs, later), (1.0 if setup.pick == R.AREA else 0.0) - SAME
+    z0, later, trial, values = inputs.z0, np.empty((4, L.N_STATE)), np.empty(2), np.empty(4)
+    shift = _later_states(setup, i, state, inputs, later)
     best, best_need, best_value, best_score = -1, 0.0, -math.inf, -math.inf
     for m in range(setup.library.shape[0] + BEFORE):
         speed, heading = _command_of_mode(setup, i, m, state, nominal, plan)
@@ -173,17 +172,15 @@ def take_mode(
             trial[k] = (values[k + 2] - values[1]) / (shift[k] * setup.dt_s)
         have = (values[1] - values[0]) / setup.dt_s + setup.alpha_per_s * value
         need = trial[0] * z0[0] + trial[1] * z0[1] - have
-        if value > 0.0 and setup.pick == R.AREA:
+        if value > 0.0:
             score = share_left(trial, need, inputs.box)
-        elif value > 0.0 and answer_of(trial, need, inputs.box, z0, z):
-            score = -math.hypot(z[0] - z0[0], z[1] - z0[1])
         better = value > best_value
         if value > 0.0 and best_value > 0.0:
             better = score > best_score + SAME or (score >= best_score - SAME and better)
         if best < 0 or better:
             best, best_need, best_value, best_score = m, need, value, score
             row[:] = trial
-        if value > 0.0 and row[0] * z0[0] + row[1] * z0[1] >= best_need and best_score >= most:
+        if value > 0.0 and row[0] * z0[0] + row[1] * z0[1] >= best_need and best_score >= 1.0 - SAME:
             break  # takes nothing away: no other mode can do better
     return best, best_need, best_value
 
@@ -239,12 +236,11 @@ def decide_games(setup: R.Setup, games: Games) -> None:
 class PolicyLibrary(R.RolloutFilter):
     """PL-CBF.
 
-    Settings: ``horizon_s``, length of a rollout (T of the paper), ``alpha_per_s``, rate of the row dV/dt >= -alpha V,
-    and ``pick``, the safe mode taken: ``area`` the one that leaves the largest part of the inputs, as the authors'
-    published code does, ``nearest`` the one whose program changes the nominal inputs least.
+    Settings: ``horizon_s``, length of a rollout (T of the paper), and ``alpha_per_s``, rate of the row
+    dV/dt >= -alpha V.
     """
 
-    defaults: ClassVar[dict[str, Any]] = {"horizon_s": 10.0, "alpha_per_s": 1.0, "pick": "area"}
+    defaults: ClassVar[dict[str, Any]] = {"horizon_s": 10.0, "alpha_per_s": 1.0}
 
     def _decide(self, games: Games) -> None:
         decide_games(self._setup, games)

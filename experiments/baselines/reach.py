@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import ConfigError, TableError
-from steerclear.shield.jit import Array, BoolArray, IntArray, copy_row
+from steerclear.shield.jit import Array, BoolArray, IntArray, copy_row, kernel
 from steerclear.shield.platforms import Platform
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.actuator import actuate, command_for_turn, thrust_after
@@ -33,7 +33,6 @@ from steerclear.shield.tables.lookup import WHOLE_S, Tables, table_gradient, tab
 from steerclear.shield.tables.settings import OtherMay
 from steerclear.shield.workspace import BACKUP, BEST_EFFORT, HELD, LARGEST_COMMAND, LEAST_CHANGE, NOT_COVERED, PASSED
 
-from ..jit import kernel
 from .active_set import OPTIMAL, project
 from .base import BatchFilter, Games, game_of
 

@@ -33,13 +33,12 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import ConfigError
-from steerclear.shield.jit import Array, BoolArray, IntArray
+from steerclear.shield.jit import Array, BoolArray, IntArray, kernel
 from steerclear.shield.platforms import Platform
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.step import step_boat
 from steerclear.shield.platforms.usv import wrap_degrees
 
-from ..jit import kernel
 from .base import BatchFilter, Games, game_of
 from .unicycle import input_limits
 
@@ -51,8 +50,6 @@ LIBRARY = np.array([(0.0, HOLD_SPEED), *((side * turn, 1.0) for turn in TURNS_DE
 """(M, 2) turn deg and share of top speed of each manoeuvre: hold, turns to either side, stop."""
 SWITCH_SHARES = (1.0, 0.5, 0.25, 0.125)
 """Switching times that are tried, as shares of the longest; then one step, then none."""
-AREA, NEAREST = 0, 1
-PICKS = {"area": AREA, "nearest": NEAREST}
 MOST = {"horizon_s": 60.0, "switch_s": 30.0, "alpha_per_s": 10.0}
 N_PLAN = 5
 NO_PLAN = -1.0
@@ -77,7 +74,6 @@ class Setup(NamedTuple):
     dt_s: float
     worst: bool
     alpha_per_s: float
-    pick: int
 
 
 class Around(NamedTuple):
@@ -212,7 +208,6 @@ class RolloutFilter(BatchFilter):
             dt_s=dt_s,
             worst=name == "gatekeeper-worst",
             alpha_per_s=read.get("alpha_per_s", 1.0),
-            pick=PICKS[read.get("pick", "area")],
         )
 
     @classmethod
@@ -225,10 +220,6 @@ class RolloutFilter(BatchFilter):
         for key, value in given.items():
             if key not in cls.defaults:
                 raise ConfigError(f"filter {name!r} has no setting {key!r}; it knows {', '.join(cls.defaults)}")
-            if key == "pick":
-                if value not in [*PICKS]:
-                    raise ConfigError(f"pick of filter {name!r} is {value!r}; choose {' or '.join(PICKS)}")
-                continue
             least = 0.0 if key == "alpha_per_s" else dt_s
             number = isinstance(value, (int, float)) and not isinstance(value, bool)
             if not number or not least <= value <= MOST[key] or value == 0.0:

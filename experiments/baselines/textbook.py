@@ -17,12 +17,11 @@ from warnings import warn
 import numpy as np
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import ConfigError
-from steerclear.shield.jit import Array, BoolArray, IntArray
+from steerclear.shield.jit import Array, BoolArray, IntArray, kernel
 from steerclear.shield.platforms import Platform
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.usv import clamp, wrap_degrees
 
-from ..jit import kernel
 from .barriers import BARRIERS, Barrier, Gains, dot
 from .base import BatchFilter, Games, game_of
 from .unicycle import SOLVED, UNSOLVED, command_of_inputs, holds, input_limits, inputs_of_command, solve

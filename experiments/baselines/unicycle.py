@@ -16,14 +16,13 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from steerclear.shield.jit import Array
+from steerclear.shield.jit import Array, kernel
 from steerclear.shield.platforms import Platform, step_boat
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.actuator import actuate, command_for_turn, largest_turn
 from steerclear.shield.platforms.limits import LONGEST_S, cruise
 from steerclear.shield.platforms.usv import clamp, fresh_state, wrap_degrees
 
-from ..jit import kernel
 from .active_set import OPTIMAL, project
 
 SOLVED, RELAXED, UNSOLVED = 1, 2, 3

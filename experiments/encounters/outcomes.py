@@ -27,6 +27,7 @@ from .. import oracle
 from ..baselines.reach import ReachFilter, mark_safe
 from ..baselines.registry import NONE, SHIELD, FilterMaker, build_filter
 from ..game_metrics import DEADLOCK_S, count_reversals, deadlocks
+from ..verdicts import own_side
 from .scenarios import draw
 from .scene import DT_S, Conditions, Scenes
 from .simulate import Trajectory, play
@@ -177,7 +178,8 @@ def judge_game(played: Trajectory, game: int) -> dict[str, float]:
     states, scenes, conditions = played.state[:, game], played.scenes, played.conditions
     found = find_breaches(states[:, :, :2], conditions.radius_m)
     ours = [row for row in found if scenes.own[row[1:3].astype(int)].any()]
-    current, delays = scenes.current[game] * conditions.current_mps, np.where(scenes.own, conditions.delay_steps, 0)
+    current = scenes.current[game] * conditions.current_mps
+    delays = np.where(scenes.own, conditions.delay_steps(DT_S), 0)
     motion = oracle.Motion(tuple(current.tolist()), tuple(delays.tolist()))
     judged = oracle.judge_breaches(states, scenes.params, ours[:MOST_JUDGED], conditions.radius_m, DT_S, motion=motion)
     entries = [_entry(verdict, scenes.own) for verdict in judged]
@@ -191,12 +193,7 @@ def judge_game(played: Trajectory, game: int) -> dict[str, float]:
 
 def _entry(verdict: oracle.BreachVerdict, own: BoolArray) -> dict[str, Any]:
     """Outcome for the own side of a violation, how long before it that side could avoid it, s, who is responsible."""
-    ours = [side for side in (verdict.first, verdict.second) if own[side.own]]
-    best = max(ours, key=lambda side: -1 if side.last_step is None else side.last_step)
-    inside = own[list(verdict.responsible_boats())]
-    side = str(verdict.responsible)
-    if len(inside):
-        side = "own" if all(inside) else "both" if any(inside) else "opponent"
+    best, side = own_side(verdict, np.flatnonzero(own).tolist())
     late_s = math.nan if best.last_preventable_s is None else best.last_preventable_s
     return {"outcome": str(best.outcome), "last_preventable_s": late_s, "responsible": float(SIDES.index(side))}
 

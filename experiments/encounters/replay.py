@@ -20,6 +20,8 @@ from .simulate import Trajectory, play
 
 EDGE_M, SHAPE = 5.0, 1.6
 """Water around open-water encounters, m, and width over height of its picture."""
+OUT_OF_SIGHT_M = [[-1e4, -1e4], [-1e4, -1e4]]
+"""Where the flags are, of which an encounter has none."""
 Water = tuple[np.ndarray, np.ndarray]
 """Lower left corner and size of what a replay shows, m."""
 
@@ -56,15 +58,35 @@ def record_of(played: Trajectory, game: int, title: str, guarded: bool, water: W
     changed = (nominal != filtered).any(axis=2)
     for commands in (nominal, filtered):
         commands[..., 1] = wrapped(commands[..., 1] + heading[:-1])
-    found, names, bounds = find_breaches(position, radius_m), [f"agent_{k}" for k in range(n)], size.tolist()
-    out_of_sight = [[-1e4, -1e4], [-1e4, -1e4]]  # an encounter has no flags
-    meta = {
+    found = find_breaches(position, radius_m)
+    return make_record(
+        _meta_of(played, title, size.tolist(), guarded),
+        position=position,
+        heading_deg=wrapped(heading),
+        speed_mps=state[:, :, L.SPEED],
+        **{name: np.zeros((steps + 1, n), bool) for name in ("has_flag", "is_tagged", "oob")},
+        flag_position=np.tile(np.array(OUT_OF_SIGHT_M), (steps + 1, 1, 1)),
+        captures=np.zeros((steps + 1, 2), np.int64),
+        wanted=nominal,
+        sent=filtered,
+        reason=np.where(own, played.reason[:, game], NOT_COVERED).astype(np.uint8),
+        intervened=own & changed,
+        safety_margin_m=np.where(own & np.isfinite(margin_m), margin_m, np.nan),
+        breaches=found[scenes.own[found[:, 1:3].astype(np.int64)].any(axis=1)],
+    )
+
+
+def _meta_of(played: Trajectory, title: str, bounds: list[float], guarded: bool) -> dict[str, Any]:
+    """Settings of a game that an encounter is shown as."""
+    scenes, radius_m = played.scenes, played.conditions.radius_m
+    names = [f"agent_{k}" for k in range(len(scenes.team))]
+    return {
         "dt_s": DT_S,
         "env_bounds_m": bounds,
         "team_size": int(scenes.own.sum()),
         "agent_ids": names,
         "team": scenes.team.tolist(),
-        "flag_home": out_of_sight,
+        "flag_home": OUT_OF_SIGHT_M,
         "scrimmage": [[bounds[0], 0.0], bounds],
         "catch_radius_m": 0.0,
         "flag_keepout_m": 0.0,
@@ -78,21 +100,6 @@ def record_of(played: Trajectory, game: int, title: str, guarded: bool, water: W
         "platforms": list(scenes.platforms),
         "title": title,
     }
-    return make_record(
-        meta,
-        position=position,
-        heading_deg=wrapped(heading),
-        speed_mps=state[:, :, L.SPEED],
-        **{name: np.zeros((steps + 1, n), bool) for name in ("has_flag", "is_tagged", "oob")},
-        flag_position=np.tile(np.array(out_of_sight), (steps + 1, 1, 1)),
-        captures=np.zeros((steps + 1, 2), np.int64),
-        wanted=nominal,
-        sent=filtered,
-        reason=np.where(own, played.reason[:, game], NOT_COVERED).astype(np.uint8),
-        intervened=own & changed,
-        safety_margin_m=np.where(own & np.isfinite(margin_m), margin_m, np.nan),
-        breaches=found[scenes.own[found[:, 1:3].astype(np.int64)].any(axis=1)],
-    )
 
 
 def _water_of(positions: Sequence[np.ndarray], scenes: Scenes) -> Water:

@@ -116,7 +116,6 @@ def results_of(run: Run) -> dict[str, Any]:
         "goals": goals,
         "worst": worst_encounters(columns),
         "files": {"games": table_name()},
-        "deprecated": {"bars": goals},
     }
 
 

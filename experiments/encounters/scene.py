@@ -19,9 +19,9 @@ from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array, IntArray
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.tracks import whole_steps
 
 from ..play.conditions import MOST as MOST_CONDITIONS
+from ..play.conditions import Conditions as GameConditions
 from ..play.conditions import check_values
 from ..result_files import read_json, write_json
 
@@ -83,33 +83,19 @@ def to_goals(speed_mps: float, reached_m: float) -> Array:
 
 
 @dataclass(frozen=True)
-class Conditions:
-    """What holds for all encounters of a run.
-
-    Attributes:
-        radius_m: separation to keep, m.
-        delay_s: time from a command of an own boat to its effect, s.
-        noise_m: bound on the error of every position that the own team sees, m.
-        current_mps: speed of the current, m/s; each encounter draws its direction, of which no filter is told.
+class Conditions(GameConditions):
+    """What holds for all encounters of a run: that of games, and ``radius_m``, the separation to keep, m.
 
     Raises:
-        ConfigError: a value that is not finite, negative or beyond `MOST`.
+        ConfigError: a value that is not finite, negative or too large.
     """
 
     radius_m: float = 2.5
-    delay_s: float = 0.0
-    noise_m: float = 0.0
-    current_mps: float = 0.0
 
     def __post_init__(self) -> None:
         check_values(asdict(self), MOST)
         if not self.radius_m > 0.0:
             raise ConfigError(f"radius_m is {self.radius_m}; give a radius above 0")
-
-    @property
-    def delay_steps(self) -> int:
-        """Steps from a command of an own boat to its effect."""
-        return whole_steps(self.delay_s, DT_S)
 
 
 @dataclass(frozen=True)

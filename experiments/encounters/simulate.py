@@ -11,14 +11,13 @@ from warnings import warn
 import numpy as np
 from numpy.typing import NDArray
 from steerclear.shield.exceptions import FleetError
-from steerclear.shield.jit import Array, IntArray
+from steerclear.shield.jit import Array, IntArray, kernel
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms import step_boat
 from steerclear.shield.platforms.actuator import command_for_turn
 from steerclear.shield.platforms.usv import wrap_degrees
 
 from ..baselines.registry import FilterMaker, SafetyFilter, build_filter
-from ..jit import kernel
 from ..play.conditions import observe
 from . import scene as S
 from .scene import DT_S, Conditions, Scenes
@@ -157,6 +156,27 @@ def move(world: World, filtered: Array, step: int) -> None:
                     world.first_goal_s[b, i] = (step + 1) * DT_S
 
 
+def world_of(scenes: Scenes, conditions: Conditions) -> World:
+    """The start of scenes."""
+    shape, delayed = (scenes.games, len(scenes.team)), conditions.delay_steps(DT_S)
+    held = scenes.state[:, :, [L.SPEED, L.HEADING]]
+    return World(
+        params=scenes.params,
+        team=scenes.team,
+        scripts=scenes.script,
+        goals=scenes.goals,
+        current_mps=scenes.current * conditions.current_mps,
+        state=scenes.state.copy(),
+        seen=scenes.state.copy(),
+        error=np.zeros((*shape, 2)),
+        seeds=scenes.noise_seed.copy(),
+        goal_at=np.zeros(shape, np.int64),
+        phase_at=np.zeros(shape, np.int64),
+        first_goal_s=np.full(shape, np.nan),
+        queue=np.tile(held, (delayed, 1, 1, 1)).reshape(delayed, *shape, 2),
+    )
+
+
 @dataclass(frozen=True)
 class Trajectory:
     """What happened in B games of T steps.
@@ -204,23 +224,7 @@ def play(scenes: Scenes, guard: str | FilterMaker | SafetyFilter, conditions: Co
     safety_filter: Any = guard
     if isinstance(guard, str) or not hasattr(guard, "decide"):
         safety_filter = build_filter(guard, scenes, conditions)
-    steps, shape, delayed = scenes.steps, (scenes.games, len(scenes.team)), conditions.delay_steps
-    held = scenes.state[:, :, [L.SPEED, L.HEADING]]
-    world = World(
-        params=scenes.params,
-        team=scenes.team,
-        scripts=scenes.script,
-        goals=scenes.goals,
-        current_mps=scenes.current * conditions.current_mps,
-        state=scenes.state.copy(),
-        seen=scenes.state.copy(),
-        error=np.zeros((*shape, 2)),
-        seeds=scenes.noise_seed.copy(),
-        goal_at=np.zeros(shape, np.int64),
-        phase_at=np.zeros(shape, np.int64),
-        first_goal_s=np.full(shape, np.nan),
-        queue=np.tile(held, (delayed, 1, 1, 1)).reshape(delayed, *shape, 2),
-    )
+    world, steps, shape = world_of(scenes, conditions), scenes.steps, (scenes.games, len(scenes.team))
     played = Trajectory(
         scenes=scenes,
         conditions=conditions,

@@ -44,7 +44,7 @@ def check_entry(path: str, preset: str, max_time_s: float | None, answer_s: floa
         answer_s: time it has for the actions of a decision, s.
 
     Returns:
-        What `docs_keys.ENTRY_CHECK` describes.
+        What `docs.KEYS` describes.
     """
     imports, made = imports_of(path), made_for(path)
     started = time.perf_counter()

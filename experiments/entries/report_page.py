@@ -1,8 +1,8 @@
-"""An entry's games three ways and their page: alone, as the zip that is handed in, with the shield round the game."""
+"""An entry's games three ways and their report: alone, as the zip handed in, with the shield round the game."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,10 +13,10 @@ from steerclear.policies.submissions.stage import Stage
 
 from ..ablation import AblationSettings
 from ..metrics import breach_column, check, game_goals
-from ..page import render, write_page
 from ..play.spec import MatchSpec
+from ..report import Report, Section
 from ..statistics import paired_difference
-from ..tables import interval_text, number_text
+from ..tables import Table, interval_text
 from ..workers import Row
 from .package import game_spec
 from .wrap import own_files, shielded_files, write_zip
@@ -27,16 +27,21 @@ if TYPE_CHECKING:
 PAGE, ZIP = "entry.html", "shielded.zip"
 BARE, IN_ZIP, AROUND = "entry alone", "shield in the zip", "shield round the game"
 """What a figure is of: no shield, that of the zip that is handed in, or one that decides ten times a second."""
-LOOKED = "a game, every step looked at"
-TILES = (
-    ("opponents", "hits with opponents", LOOKED),
-    ("teammates", "hits with teammates", LOOKED),
-    ("collisions", "counted by the game", "a game, once a decision"),
-    ("captures", "captures", "a game"),
-    ("net", "net of captures", "made less given up, a game"),
-)
 SUMS = ("captures", "captures_against", "teammates", "opponents", "collisions")
-"""Columns of totals in the table."""
+HEADS = [
+    *("opponent", "games", "captures", "given up", "change of the net, a game"),
+    *("hits with teammates", "hits with opponents", "counted by the game"),
+]
+HIT = (
+    "A hit is one entry of two boats into {radius:g} m, looked for after every step of motion; the game itself looks "
+    "once a decision, and counts two teammates that meet twice. In brackets the 95 % interval of the paired change: "
+    "where it holds 0, the games do not say that the shield costs captures."
+)
+OF_ZIP = (
+    "The zip is what steerclear entry wrap writes: it decides once a decision of the game, and boats that the game "
+    "drives (tagged, out of bounds, disabled) are out of its reach. The shield round the game decides before every "
+    "step, and steers tagged boats and those out of bounds, too. "
+)
 
 
 @dataclass(frozen=True)
@@ -130,54 +135,34 @@ def by_opponent(rows: Sequence[Row], settings: EntryGames) -> dict[str, list[pd.
     return found
 
 
-def write_entry_page(
-    rows: Sequence[Row],
-    settings: EntryGames,
-    folder: Path,
-    links: Sequence[tuple[str, str]],
-    warnings: Sequence[str],
-) -> Path:
-    """Write the page of the games, with links (label, file name) to what there is to look at, and warnings first."""
-    groups = by_opponent(rows, settings)
-    page = render(
-        "entry.html",
-        title=f"{Path(settings.own).name} and the shield",
-        subtitle=f"{settings.preset}, the shield keeps {settings.separation_m:g} m: {settings.how_many()}, from the "
-        "same seeds.",
-        warnings=warnings,
-        ways=[BARE, *([IN_ZIP] if settings.zip_file else []), AROUND],
-        tiles=_tiles(groups),
-        rows=[_opponent(name, ways, settings.seed) for name, ways in groups.items()],
-        radius=f"{settings.separation_m:g} m",
-        links=links,
-    )
-    return write_page(folder / PAGE, page)
-
-
-def _tiles(groups: Mapping[str, Sequence[pd.DataFrame]]) -> list[tuple[str, list[str], str]]:
-    """Label, a figure a game for each way, and a note."""
+def entry_report(rows: Sequence[Row], settings: EntryGames) -> Report:
+    """The report of the games: sums of all games against each opponent, and of all together."""
     import pandas as pd
 
-    ways = [pd.concat(each) for each in zip(*groups.values(), strict=True)]
-    return [
-        (label, [number_text(float(games[column].mean()) if len(games) else 0.0) for games in ways], note)
-        for column, label, note in TILES
-    ]
+    groups = by_opponent(rows, settings)
+    ways = [BARE, *([IN_ZIP] if settings.zip_file else []), AROUND]
+    body = [_line(Path(name).name, games, settings.seed) for name, games in groups.items()]
+    if len(body) > 1:
+        together = [pd.concat(games) for games in zip(*groups.values(), strict=True)]
+        body.append(_line("all together", together, settings.seed))
+    words = (OF_ZIP if settings.zip_file else "") + HIT.format(radius=settings.separation_m)
+    return Report(
+        f"{Path(settings.own).name} and the shield",
+        f"{settings.preset}, the shield keeps {settings.separation_m:g} m: {settings.how_many()}, from the same seeds.",
+        sections=[Section(f"Sums of all games, {' → '.join(ways)}", [Table("", HEADS, body)], words, wide=True)],
+    )
 
 
-def _opponent(name: str, ways: Sequence[pd.DataFrame], seed: int) -> list[str]:
-    """Row of the table: one opponent, totals of all games that were played in every way."""
+def _line(name: str, ways: Sequence[pd.DataFrame], seed: int) -> list[str]:
+    """Row of the table: totals of games that were played in every way."""
     changes = [paired_difference(ways[0]["net"], games["net"], seed) for games in ways[1:] if len(games)]
     sums = [" → ".join(f"{games[column].sum():g}" for games in ways) for column in SUMS]
     change = " → ".join(interval_text(asdict(one)) for one in changes) or "-"
-    return [Path(name).name, str(len(ways[0])), *sums[:2], change, *sums[2:]]
+    return [name, str(len(ways[0])), *sums[:2], change, *sums[2:]]
 
 
-def games_to_look_at(rows: Sequence[Row], settings: EntryGames, most: int) -> list[tuple[str, Row, Row]]:
-    """Pairs of games off and on with why they are worth a look: most hits off, hits on, most captures lost.
-
-    Each pair once, at most so many.
-    """
+def games_to_look_at(rows: Sequence[Row], settings: EntryGames) -> list[tuple[str, Row, Row]]:
+    """Pairs of games off and on, each once, and why they are worth a look: most hits off, hits on, captures lost."""
     import pandas as pd
 
     groups = [(ways[0], ways[-1]) for ways in by_opponent(rows, settings).values()]
@@ -194,5 +179,4 @@ def games_to_look_at(rows: Sequence[Row], settings: EntryGames, most: int) -> li
         if len(worth) and worth.max() > 0:
             best = worth.idxmax()
             chosen.setdefault((off.at[best, "opponent"], off.at[best, "game"]), words)
-    pairs = [(words, played[(*game, False)], played[(*game, True)]) for game, words in chosen.items()]
-    return pairs[:most]
+    return [(words, played[(*game, False)], played[(*game, True)]) for game, words in chosen.items()]

@@ -31,8 +31,6 @@ AGAIN = 77
 OVER = 78
 """The supervisor's own, when it ended the code because of a limit."""
 READY = "ready\n"
-ALONE = "STEERCLEAR_ENTRY_ALONE"
-"""Tells a submission's loader that the process is the submission's, see `policies.submissions.loader`."""
 LOOK_S = 0.1
 """How often limits are looked at, s."""
 GIB = 1024**3
@@ -225,7 +223,6 @@ def main(arguments: list[str]) -> int:
         with contextlib.suppress(Exception):  # the code itself will meet it
             importlib.import_module(name)
     _prctl(_SET_SUBREAPER, 1)  # processes whose parent ended become this one's children, so that none gets away
-    os.environ[ALONE] = "1"
     _limit("RLIMIT_CORE", 0)
     gc.freeze()
     return supervisor.run()

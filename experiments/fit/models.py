@@ -8,13 +8,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from steerclear.shield.jit import Array
+from steerclear.shield.jit import Array, kernel
 from steerclear.shield.platforms import Gains, Platform, step_boat
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.proving import reference_models
 from steerclear.shield.tracks import thrust_at
 
-from ..jit import kernel
 from .runs import STEP_S, Run
 
 DELAY = ("delay_s", 0.15, 0.0, 1.0)

@@ -21,12 +21,11 @@ from steerclear.env.randomness import next_uniform
 from steerclear.env.record import absolute_commands
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.fleet import Fleet
-from steerclear.shield.jit import Array, copy_row
+from steerclear.shield.jit import Array, copy_row, kernel
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.tracks import whole_steps
 from steerclear.shield.wrappers.mctf import MctfReader
 
-from ..jit import kernel
 from ..oracle import Motion
 
 MOST = {"delay_s": 2.0, "noise_m": 5.0, "current_mps": 2.0}

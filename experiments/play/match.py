@@ -6,13 +6,17 @@ import contextlib
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from steerclear.env.core import BatchedMctf
 from steerclear.env.mctf import MctfEnv
-from steerclear.env.record import Record, absolute_commands, find_breaches, meta_of
+from steerclear.env.record import GameRecorder, Record, absolute_commands, find_breaches, meta_of
+from steerclear.policies.entrants.play import EntrantTeam
 from steerclear.policies.registry import KEYBOARD
+from steerclear.policies.scripted.team import ScriptedTeam
 from steerclear.shield.exceptions import GameError, SteerclearError
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import layout as L
@@ -23,7 +27,6 @@ from ..verdicts import StateLog, judge_game, verdict_columns
 from ..workers import Workers, outcomes
 from .openings import opening
 from .policy_runner import PolicyRunner
-from .recorder import PlayingEnv, Recorder, live_view, read_infos
 from .shielding import Seen, Shielding, shield_game
 from .spec import SIDES, MatchSpec
 
@@ -37,13 +40,35 @@ class MatchResult:
 
     Attributes:
         spec: what was to be played.
-        row: flat columns, as ``rows of ablate`` in `docs_keys.KEYS` describes them.
+        row: flat columns, as ``rows of ablate`` in `docs.KEYS` describes them.
         record: everything that happened, see `steerclear.env.record`.
     """
 
     spec: MatchSpec
     row: dict[str, Any]
     record: Record
+
+
+class PlayingEnv(MctfEnv):
+    """An `MctfEnv` that can leave its infos out (``tells``): they take a fifth of a step's time."""
+
+    tells = True
+
+    def infos(self) -> dict[str, dict[str, Any]]:
+        """Infos by agent id; empty where nobody reads them."""
+        return super().infos() if self.tells else {}
+
+
+def read_infos(teams: Iterable[Any]) -> bool:
+    """Whether one of these policies may read infos: all but our own scripted teams and entrants, which see the game."""
+    ours = (EntrantTeam, ScriptedTeam)
+    return not all(any(isinstance(p, team) and type(p).act is team.act for team in ours) for p in teams)
+
+
+def live_view(core: BatchedMctf) -> Any:
+    """What a recorder reads, as the game's own arrays: always of this moment, never copied; valid until a reset."""
+    names = ("state", "has_flag", "is_tagged", "oob", "is_disabled", "flag_position", "captures")
+    return SimpleNamespace(**{name: getattr(core.games, name)[0] for name in names})
 
 
 class Match:
@@ -73,7 +98,8 @@ class Match:
                     stack.callback(policies[-1].close)
             stack.pop_all()
         self.teams = [PolicyRunner(policy, self.env, self._boats_of(team)) for team, policy in enumerate(policies)]
-        self._recorder: Recorder | None = None
+        self._recorder = GameRecorder()
+        self._view: Any = None
         self._log = StateLog() if spec.judged else None
         self._driven: list[NDArray[np.bool_]] = []
         self._decision_us: list[float] = []
@@ -98,7 +124,6 @@ class Match:
             self._record_step()
             if watcher is not None and not watcher(self.env):
                 break
-        assert self._recorder is not None  # _start() made it
         record = self._recorder.finish()
         record = {**record, "breaches": find_breaches(record["position"], self.shielding.separation_m)}
         return MatchResult(self.spec, self._row(record, time.perf_counter() - started), record)
@@ -138,7 +163,8 @@ class Match:
             reason_names=self.shielding.reason_names,
             title=f"{self.names['blue']} – {self.names['red']}, {conditions}" if conditions else "",
         )
-        self._recorder = Recorder(live_view(self.env.core), meta)
+        self._view = live_view(self.env.core)
+        self._recorder.start(self._view, meta)
         if self._log is not None:
             self._log.start(self.env.core)
         if self.env.renderer is not None:
@@ -165,10 +191,10 @@ class Match:
             self.env.renderer.overlay = Overlay(*commands, seen.reason, seen.intervened, seen.safety_margin_m)
 
     def _record_step(self) -> None:
-        if self._moment is None or self._recorder is None:
+        if self._moment is None:
             raise SteerclearError("the game moved without asking for commands; build the Match anew")
         wanted, sent, seen = self._moment
-        self._recorder.step(wanted, sent, seen.reason, seen.intervened, seen.safety_margin_m)
+        self._recorder.step(self._view, wanted, sent, seen.reason, seen.intervened, seen.safety_margin_m)
         self._driven.append(self.env.core.driven[0].copy())
         if self._log is not None:
             self._log.step(self.env.core)

@@ -1,30 +1,24 @@
-"""What value tables and their sets look like: terminal, JSON, pages of docs, a picture."""
+"""What value tables and their sets look like: terminal, JSON, pages of docs."""
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rich.console import Console
-from steerclear.shield.exceptions import TableError
-from steerclear.shield.tables.areas import HEADINGS_DEG, SPEED_SHARES, unsafe
-from steerclear.shield.tables.files import Card, ValueTable
+from steerclear.shield.tables.areas import HEADINGS_DEG
+from steerclear.shield.tables.files import Card
 from steerclear.shield.tables.make import COARSER
 
-from ..markdown import MADE, goals_of, goals_table, line, table
+from ..markdown import GOAL_HEADS, goal_row
 from ..metrics import judged
-from ..plots import text as plot_text
 from ..provenance import head_of
-from ..result_files import make_folder_of
-from ..tables import titled
+from ..report import Report, Section
+from ..tables import Table, titled
 from .sets import BAND_M, BEYOND, LONGEST_S, MISSED_PERCENT_GOAL, RATIO_GOAL, PlayedSet, SetPair
 
-COLOURS = ("#e3bfae", "#a5c5d1", "#c5cba0", "#c6a8d1")
-SHOWN_DEG = (0.0, 90.0, 180.0)
+CARD_WORDS = "What the words mean: [tables.md](tables.md)."
 AREA_HEADS = ["own/other m/s", *(f"{heading:g}°" for heading in HEADINGS_DEG)]
 _PLACE = {"own/other m/s": "{0.own_mps:g}/{0.other_mps:g}", "heading": "{0.heading_deg:g}°"}
 SETS_COLUMNS = {
@@ -55,7 +49,7 @@ pursuers are strategies, the table's opponent is the worst that its grid and hor
 A set much larger than the table's costs freedom, one that misses positions costs the promise. The goals are
 {RATIO_GOAL:g} times the area and {MISSED_PERCENT_GOAL:g} % missed, in every row."""
 LOOKED_UP = """The shield looks opponents up in this very table, so its set is the table's at a margin: the ratio is
-what the margin costs, and that nothing is missed says nothing. `--shield-set opponent_model=turning_circle` compares
+what the margin costs, and that nothing is missed says nothing. --shield-set opponent_model=turning_circle compares
 manoeuvres instead."""
 PLAYED_WORDS = f"""Found by playing, to the radius, where [unsafe_sets.md](unsafe_sets.md) tells what the shield
 *promises*. Every position of the opponent whose worst-case value is below the radius counts as lost, as nobody can
@@ -92,37 +86,31 @@ def sets_goals(pairs: Sequence[SetPair], looked_up: bool = False) -> list[dict[s
 def sets_content(
     settings: Mapping[str, Any], pairs: Sequence[SetPair], looked_up: bool, started_s: float
 ) -> dict[str, Any]:
-    """The comparison as JSON; `docs_keys.KEYS` describes it."""
+    """The comparison as JSON; `docs.KEYS` describes it."""
     goals, head = sets_goals(pairs, looked_up), head_of("reach-compare", settings, started_s)
     rows = [asdict(pair) for pair in pairs]
-    return {**head, "looked_up": looked_up, "pairs": rows, "goals": goals, "deprecated": {"bars": goals}}
+    return {**head, "looked_up": looked_up, "pairs": rows, "goals": goals}
 
 
 def sets_page(contents: Sequence[Mapping[str, Any]]) -> str:
     """Write the page of the sets from contents of `sets_content`."""
-    lines = ["# Sets the shield cannot promise to save", "", MADE, "", SETS_WORDS, ""]
-    for content in contents:
-        pairs, looked_up = [SetPair(**pair) for pair in content["pairs"]], content["looked_up"]
-        lines += _section(content, pairs, SETS_COLUMNS, [LOOKED_UP, ""] if looked_up else [])
-        met = sum(all(goal["met"] is not False for goal in sets_goals([pair], looked_up)) for pair in pairs)
-        lines += [f"{met} of {len(pairs)} rows within the goals. {_version(content)}", ""]
-    return "\n".join(lines)
+    parts = [(content, [SetPair(**pair) for pair in content["pairs"]]) for content in contents]
+    return _page("Sets the shield cannot promise to save", SETS_WORDS, parts, SETS_COLUMNS)
 
 
-def _section(
-    content: Mapping[str, Any], sets: Sequence[Any], columns: Mapping[str, str], words: Sequence[str] = ()
-) -> list[str]:
-    """Lines of a page about one pair of boats: settings, table, goals."""
-    settings = content["settings"]
-    lines = [f"## {line(settings['own'])} meets {line(settings['other'])}, {settings['radius_m']:g} m", ""]
-    if settings["shield"]:
-        lines += [line(f"Shield settings: {', '.join(f'{k}={v}' for k, v in settings['shield'].items())}."), ""]
-    rows = table([*columns], rows_of(sets, columns))
-    return [*lines, *words, *rows, "", *goals_table(goals_of(content)), ""]
-
-
-def _version(content: Mapping[str, Any]) -> str:
-    return f"steerclear {line(content['versions']['steerclear'])}."
+def _page(title: str, words: str, parts: Sequence[tuple[Mapping[str, Any], Any]], columns: Mapping[str, str]) -> str:
+    """A page about several pairs of boats: of each the settings, a table and the goals."""
+    sections = []
+    for content, sets in parts:
+        settings, goals = content["settings"], [goal_row(goal) for goal in content["goals"]]
+        given = ", ".join(f"{name}={value}" for name, value in settings["shield"].items())
+        notes = [f"Shield settings: {given}."] if given else []
+        notes += [LOOKED_UP] if content.get("looked_up") else []
+        notes += [f"steerclear {content['versions']['steerclear']}."]
+        about = f"{settings['own']} meets {settings['other']}, {settings['radius_m']:g} m"
+        tables = [Table("", [*columns], rows_of(sets, columns)), Table("", GOAL_HEADS, goals)]
+        sections.append(Section(about, tables, " ".join(notes)))
+    return Report(title, "", notes=[words], sections=sections).page("")[1]
 
 
 def played_goals(sets: Sequence[PlayedSet]) -> list[dict[str, Any]]:
@@ -135,21 +123,18 @@ def played_goals(sets: Sequence[PlayedSet]) -> list[dict[str, Any]]:
 
 
 def played_content(head: Mapping[str, Any], sets: Sequence[PlayedSet]) -> dict[str, Any]:
-    """The sets as JSON, below a run's head; `docs_keys.PLAYED_SETS` describes it."""
+    """The sets as JSON, below a run's head; `docs.KEYS` describes it."""
     goals = played_goals(sets)
     rows = [{**asdict(one), "ratio": one.ratio, "player_ratio": one.player_ratio} for one in sets]
     told = {name: head[name] for name in ("command", "settings", "versions", "machine", "wall_s")}
-    return {**told, "sets": rows, "goals": goals, "deprecated": {"bars": goals}}
+    return {**told, "sets": rows, "goals": goals}
 
 
 def played_page(contents: Sequence[Mapping[str, Any]]) -> str:
     """Write the page of played sets from contents of `played_content`."""
-    lines = ["# Sets from which the shield does not save a boat", "", MADE, "", PLAYED_WORDS, ""]
-    for content in contents:
-        names = PlayedSet.__dataclass_fields__
-        sets = [PlayedSet(**{name: one[name] for name in names}) for one in content["sets"]]
-        lines += [*_section(content, sets, PLAYED_COLUMNS), _version(content), ""]
-    return "\n".join(lines)
+    names = PlayedSet.__dataclass_fields__
+    parts = [(one, [PlayedSet(**{name: row[name] for name in names}) for row in one["sets"]]) for one in contents]
+    return _page("Sets from which the shield does not save a boat", PLAYED_WORDS, parts, PLAYED_COLUMNS)
 
 
 def show_card(console: Console, card: Card) -> None:
@@ -193,19 +178,19 @@ def tables_page(cards: Sequence[str]) -> str:
     Raises:
         TableError: one is no card.
     """
-    lines = ["# Value tables: figures", "", MADE, "", "What the words mean: [tables.md](tables.md).", ""]
+    sections = []
     for card in map(Card.of_json, cards):
         errors = [
             f"{getattr(card, role)} {error['place_m_p99']:.3f} m, {error['speed_mps_p99']:.3f} m/s"
             for role, error in card.model_error.items()
         ]
         error = f"Error of the reduced model over one step, 99th percentile: {'; '.join(dict.fromkeys(errors))}."
-        lines += [f"## {line(f'{card.own} with {card.other}, {card.other_may}')}", "", _made_how(card), ""]
-        lines += [*table(["", *(f"{radius} m" for radius in _radii(card))], card_rows(card)), "", error, ""]
+        tables = [Table("", ["", *(f"{radius} m" for radius in _radii(card))], card_rows(card), error)]
         for radius in _radii(card):
-            lines += [f"Areas, m², from which {radius} m cannot be kept, by speeds and relative heading:", ""]
-            lines += [*table(AREA_HEADS, _areas(card, radius)), ""]
-    return "\n".join(lines)
+            words = f"Areas, m², from which {radius} m cannot be kept, by speeds and relative heading:"
+            tables.append(Table("", AREA_HEADS, _areas(card, radius), words))
+        sections.append(Section(f"{card.own} with {card.other}, {card.other_may}", tables, _made_how(card)))
+    return Report("Value tables: figures", "", notes=[CARD_WORDS], sections=sections).page("")[1]
 
 
 def _areas(card: Card, radius: str) -> list[list[str]]:
@@ -219,62 +204,3 @@ def _made_how(card: Card) -> str:
         f"Grid {nodes}, ranges {grid.rho_first_m:g} to {grid.rho_last_m:g} m, step {card.dt_s:g} s, "
         f"{card.iterations} steps of at most {card.horizon_s / card.dt_s:.0f}, last change {card.residual_m:.4f} m."
     )
-
-
-def draw_sets(values: ValueTable, radii_m: tuple[float, ...], path: Path) -> Path:
-    """Draw where each radius, m, cannot be kept, in the own boat's frame, bow up; one panel a heading and speed pair.
-
-    Raises:
-        TableError: the file cannot be written.
-    """
-    from matplotlib.figure import Figure  # without pyplot: no window system is touched
-
-    grid = values.card.make_grid()
-    canvas = Figure(figsize=(3.4 * len(SHOWN_DEG), 3.4 * len(SPEED_SHARES)), layout="constrained", dpi=120)
-    panels = canvas.subplots(len(SPEED_SHARES), len(SHOWN_DEG), squeeze=False)
-    farthest = max(radii_m)
-    for row, (own, other) in zip(panels, SPEED_SHARES, strict=True):
-        for axis, heading in zip(row, SHOWN_DEG, strict=True):
-            speeds = own * grid.own_top_mps, other * grid.other_top_mps
-            farthest = max(farthest, _draw_panel(axis, values, radii_m, heading, speeds))
-    for axis in panels.flat:
-        axis.set(xlim=(-1.1 * farthest, 1.1 * farthest), ylim=(-1.1 * farthest, 1.1 * farthest))
-    panels.flat[0].legend(fontsize=6, loc="upper left")
-    title = f"{values.card.own} (bow up) with {values.card.other}, {values.card.other_may}"
-    canvas.suptitle(f"{plot_text(title)}: where the other boat must not be, m")
-    try:
-        make_folder_of(path)
-        canvas.savefig(path)
-    except (OSError, ValueError) as error:
-        raise TableError(f"picture {path} cannot be written ({error}); give a .png or .svg file") from error
-    return path
-
-
-def check_picture(path: Path | None) -> None:
-    """Refuse a picture of a kind that cannot be drawn, before anything is.
-
-    Raises:
-        TableError: its ending is another than .png or .svg.
-    """
-    if path is not None and path.suffix.lower() not in (".png", ".svg"):
-        raise TableError(f"--picture {path} does not end in .png or .svg; give a name that does")
-
-
-def _draw_panel(
-    axis: Any, values: ValueTable, radii_m: tuple[float, ...], heading_deg: float, speeds: tuple[float, float]
-) -> float:
-    """Draw one panel; returns how far its sets reach, m."""
-    ring, farthest = np.linspace(0.0, 2.0 * np.pi, 181), 0.0
-    for colour, radius in zip(itertools.cycle(COLOURS), sorted(radii_m, reverse=True)):
-        ranges, bearings, inside = unsafe(values, radius, heading_deg, *speeds)
-        x, y = ranges[:, None] * np.sin(bearings), ranges[:, None] * np.cos(bearings)
-        axis.contourf(x, y, inside.astype(float), [0.5, 1.5], colors=[colour])
-        axis.plot(radius * np.sin(ring), radius * np.cos(ring), color="black", lw=0.8, ls=":")
-        farthest = max(farthest, float(ranges[inside.any(axis=1)].max(initial=0.0)))
-        axis.fill([], [], color=colour, label=f"{radius:g} m cannot be kept")
-    axis.plot(0.0, 0.0, marker=(3, 0, 0.0), color="black", ms=7)
-    axis.plot(0.9, 0.1, marker=(3, 0, -heading_deg), color="black", mfc="white", ms=7, transform=axis.transAxes)
-    axis.set_aspect("equal")
-    axis.set_title(f"other heads {heading_deg:g}°, {speeds[0]:g} / {speeds[1]:g} m/s", fontsize=9)
-    axis.tick_params(labelsize=7)
-    return farthest

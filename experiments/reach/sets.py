@@ -15,7 +15,7 @@ import numpy as np
 from steerclear.shield.batch import BatchedShield
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import ConfigError
-from steerclear.shield.jit import Array, BoolArray, IntArray
+from steerclear.shield.jit import Array, BoolArray, IntArray, kernel
 from steerclear.shield.model import boats_of
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
@@ -28,7 +28,6 @@ from steerclear.shield.tables.lookup import WHOLE_S, Tables, table_value
 from steerclear.shield.tables.margin import full_thrust_state
 from steerclear.shield.tables.moves import SUB_STEP_S, sub_steps
 
-from ..jit import kernel
 from ..runner import Experiment
 from ..workers import Job, Row
 

@@ -279,7 +279,7 @@ class SimFleet:
             return record_of(self._world.truth).record()
 
     def judge(self, team: int = 0) -> list[dict[str, Any]]:
-        """Separation violations of a team since the game began, with verdicts (`docs_keys.KEYS`).
+        """Separation violations of a team since the game began, with verdicts (`docs.KEYS`).
 
         Raises:
             ConfigError: nothing was recorded.

@@ -41,7 +41,7 @@ def state_line(fleet: SimFleet) -> str:
 
 
 def content_of(fleet: SimFleet, team: int) -> dict[str, Any]:
-    """What `docs_keys.KEYS` describes, and the breaches of a team's boats where the game was recorded."""
+    """What `docs.KEYS` describes, and the breaches of a team's boats where the game was recorded."""
     recorded = fleet.truth is not None
     breaches = fleet.judge(team) if recorded else None
     return {

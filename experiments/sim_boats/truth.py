@@ -50,7 +50,7 @@ def last_commanded(marks: Marks) -> list[int]:
 
 
 def circumstances(marks: Marks, last: Sequence[int], step: int, boats: Sequence[int]) -> dict[str, Any]:
-    """Entries of a breach at a step between boats, see `docs_keys.KEYS`.
+    """Entries of a breach at a step between boats, see `docs.KEYS`.
 
     Args:
         marks: of the whole run.
@@ -159,7 +159,7 @@ class TruthRecord:
         return {**record, "state": self._log.states, "commanded": commanded}
 
     def judge(self, team: int = 0) -> list[dict[str, Any]]:
-        """What the oracle says of the breaches that a team's boats were in, see `docs_keys.KEYS`.
+        """What the oracle says of the breaches that a team's boats were in, see `docs.KEYS`.
 
         With what held the boats then, see `circumstances`.
         """

@@ -2,12 +2,11 @@
 
 const NOT_COVERED = 6;  // reason code of a boat for which no shield decided
 
-/** Bytes of a base64 text, inflated when they were deflated. */
-async function unpack(text, deflated) {
+/** Inflated bytes of a base64 text. */
+async function unpack(text) {
   const bytes = Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
-  if (!deflated) return bytes;
   if (typeof DecompressionStream === "undefined") {
-    throw new Error("This browser cannot inflate data. Use a newer one, or write the replay with compress=False.");
+    throw new Error("This browser cannot inflate data. Use a newer one.");
   }
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
   return new Uint8Array(await new Response(stream).arrayBuffer());
@@ -51,7 +50,7 @@ function readColumns(bytes, columns) {
 /** One game with the look-ups that drawing needs. */
 class Game {
   static async open(packed) {
-    return new Game(packed, readColumns(await unpack(packed.data, packed.deflated), packed.columns));
+    return new Game(packed, readColumns(await unpack(packed.data), packed.columns));
   }
 
   constructor(packed, values) {

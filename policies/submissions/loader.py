@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import inspect
 import logging
-import os
 import random
 import sys
 from collections import deque
@@ -26,8 +25,6 @@ from .sandbox import Sandbox
 from .stage import ENTRY_FILE, MAX_BYTES, Stage
 
 logger = logging.getLogger(__name__)
-ALONE = "STEERCLEAR_ENTRY_ALONE"
-"""Environment variable of processes that run one submission only: what it sets there concerns nobody else."""
 CONFIG_FILE, CLASS_NAME, METHOD_NAME = "gen_config.py", "solution", "compute_action"
 ARGUMENTS = ("agent_id", "full_obs_normalized", "full_obs", "global_state")
 ARGUMENTS_OF_2024 = 3
@@ -145,7 +142,7 @@ class SubmissionCode(ForeignCode):
 
     def __init__(self, source: str | Path, max_bytes: int = MAX_BYTES) -> None:
         self.stage = Stage(source, max_bytes)
-        self._sandbox = Sandbox(self.stage.folder, ALONE in os.environ)
+        self._sandbox = Sandbox(self.stage.folder)
         try:
             self._class, ages = self._load()
             instance = self._build()

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from json_keys import KEYS, undocumented
 from rich.console import Console
-from steerclear.experiments import ablation
 from steerclear.experiments.ablation import (
     AblationSettings,
     failure_warnings,
@@ -22,7 +22,6 @@ from steerclear.experiments.ablation import (
     write_results,
 )
 from steerclear.experiments.docs import write_pages
-from steerclear.experiments.docs_keys import KEYS, undocumented
 from steerclear.experiments.markdown import goals_table as goals_lines
 from steerclear.experiments.metrics import check, game_goals, game_metrics_of
 from steerclear.experiments.play.spec import MatchSpec
@@ -37,7 +36,7 @@ from steerclear.experiments.tables import (
     number_text,
     pairing_table,
 )
-from steerclear.shield.exceptions import ConfigError, GameError
+from steerclear.shield.exceptions import ConfigError
 
 SETTINGS = AblationSettings(opponents=("easy", "hold"), games=2, rules={"max_time_s": 3.0})
 
@@ -117,27 +116,6 @@ def test_games_of_two_states_say_nothing_of_a_third(played):
     assert covered_table(results["pairings"][0]) is None
 
 
-def explode(job):
-    if job["opponent"] == "hold":
-        raise GameError("no room; use a larger field")
-    return [{"pairing": "medium vs easy", "game": job["game"]}]
-
-
-def test_a_bad_later_pairing_loses_nothing(tmp_path, played, monkeypatch):
-    monkeypatch.setattr(ablation, "play_job", explode)
-    run = execute(SETTINGS.experiment("ablate"), tmp_path)
-    assert (run.finished, len(run.failed)) == (4, 4)
-    run.rows = played.rows[:2]
-    assert results_of(run, SETTINGS)["failed"][0] == {
-        "pairing": "medium vs hold",
-        "game": 0,
-        "shielded": False,
-        "state": "off",
-        "error": "no room; use a larger field",
-        "fault": False,
-    }
-
-
 def hits(row, off, on):
     return {**row, "breaches_opponent_2.5m": on if row["shielded"] else off}
 
@@ -214,7 +192,6 @@ def test_results_are_written_whole_and_documented(played, tmp_path):
     assert (content["complete"], content["replay"]["same_as_played"]) == (True, True)
     assert content["settings"]["opponents"] == ["easy", "hold"]
     assert content["seeds"] == [0, 1]
-    assert content["deprecated"]["bars"] == content["goals"], "the name until 0.8.0, for one release"
     for name in content["files"].values():
         assert (played.folder / name).stat().st_size > 0
     assert [(s["pairing"], s["games_off"], s["games_on"]) for s in content["pairings"]] == [

@@ -3,6 +3,7 @@ from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
+from json_keys import KEYS, undocumented
 from steerclear.experiments.bench import POLICIES, BenchSettings, bench_goals, bench_tables, run_bench
 from steerclear.experiments.bench_measures import (
     BatchSize,
@@ -12,7 +13,6 @@ from steerclear.experiments.bench_measures import (
     solver_times,
 )
 from steerclear.experiments.docs import write_pages
-from steerclear.experiments.docs_keys import KEYS, undocumented
 from steerclear.experiments.result_files import finite, write_json
 from steerclear.shield import ShieldConfig
 from steerclear.shield.exceptions import ConfigError

@@ -12,16 +12,13 @@ from pathlib import Path
 
 import pytest
 import typer
+from commands import run
+from json_keys import KEYS, undocumented
 from steerclear.experiments import cli
 from steerclear.experiments.console import ExitCode
-from typer.testing import CliRunner
 
 ALL = (Path(__file__).parents[1] / "data" / "commands.txt").read_text(encoding="utf-8")
 """Every command with its options and arguments: public, so that none goes without a word."""
-
-
-def run(*arguments):
-    return CliRunner().invoke(cli.app, [str(argument) for argument in arguments])
 
 
 def commands_of(command, name=""):
@@ -53,9 +50,15 @@ FIGURES = {
 
 def test_the_same_seeds_give_the_same_figures_and_files(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "80")
     done = run(*TINY, "--out", "out", "--json", "copy.json")
     assert done.exit_code == ExitCode.OK, done.output
     content = json.loads(Path("copy.json").read_text())
+    assert json.loads(Path("out/results.json").read_text()) == content
+    assert undocumented(content, KEYS["ablate"]) == []
+    assert "medium vs easy: 2 games" in done.stdout
+    assert "covered decides for them too. Goals are of shield on." in " ".join(done.stdout.split())
+    assert max(len(line) for line in done.stdout.splitlines()) <= 80
     metrics = content["pairings"][0]["metrics"]
     found = {key: tuple(metrics[key].get(s, {}).get("value") for s in ("off", "on", "covered")) for key in FIGURES}
     assert found == {key: pytest.approx(values, abs=5e-4) for key, values in FIGURES.items()}
@@ -89,7 +92,7 @@ def test_a_tournament_of_fixed_seeds(tmp_path, monkeypatch):
     off, covered = content["states"]
     lines = {(state["state"], line["team"]): line for state in (off, covered) for line in state["standings"]}
     assert {key: (line["rank"], line["score"], line["collisions"]) for key, line in lines.items()} == STANDINGS
-    assert {path.name for path in Path("out").iterdir()} >= {"replay-1.html", "replay-2.html", "replay-3.html"}
+    assert {path.name for path in Path("out").iterdir()} >= {"report.html", "replay.html"}
     again = run(*arguments, "--resume")
     assert again.exit_code == ExitCode.OK, again.output
     assert "4 of 4 games are in out/rows.jsonl and are taken from there" in again.stderr
@@ -172,5 +175,5 @@ def test_a_folder_of_an_earlier_version_is_refused_by_its_name(tmp_path, monkeyp
     before = {path.name: path.read_text() for path in Path("old").iterdir()}
     done = run("ablate", "--opponents", "hold", "--out", "old", "--resume")
     assert done.exit_code == ExitCode.BAD_INPUT
-    assert "holds results of steerclear 0.8.0, which this version reads (compare, docs) but does not" in done.stderr
+    assert "holds results of steerclear 0.8.0, whose games this version does not read; make them again" in done.stderr
     assert {path.name: path.read_text() for path in Path("old").iterdir()} == before

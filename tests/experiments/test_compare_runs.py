@@ -4,12 +4,12 @@ import json
 import math
 
 import pytest
+from json_keys import KEYS, undocumented
 from steerclear.experiments.cli import app
 from steerclear.experiments.compare_runs import compare_runs, differs, read_run
 from steerclear.experiments.console import ExitCode
-from steerclear.experiments.docs_keys import KEYS, undocumented
 from steerclear.experiments.result_files import write_json
-from steerclear.experiments.runner import append_row, job_id
+from steerclear.experiments.runner import append_row
 from steerclear.shield.exceptions import ConfigError
 from typer.testing import CliRunner
 
@@ -86,20 +86,6 @@ def test_games_of_one_seed_are_pairs_and_only_those_count(folders):
     assert "tags" not in metrics, "no game has that column"
 
 
-def test_results_of_0_8_0_are_read(folders, tmp_path):
-    """Its rows lay in games.jsonl, a flat line each, with a key, a digest and a sum."""
-    old = tmp_path / "old"
-    write_run(old, [row("easy", g, True, captures=3) for g in range(3)])
-    (old / "rows.jsonl").unlink()
-    lines = []
-    for g in range(3):
-        entry = {"key": f"{g}", "code": "older", **row("easy", g, True, captures=3)}
-        lines.append(json.dumps({**entry, "sum": job_id(entry)}))
-    (old / "games.jsonl").write_text("\n".join([*lines, '{"cut']))
-    found = compare_runs(read_run(folders[0]), read_run(old))
-    assert found["pairings"][0]["metrics"]["net_captures"]["difference"]["value"] == 2.0
-
-
 def test_what_differs_is_told_and_only_that(folders):
     first, second = map(read_run, folders)
     assert differs(first, second) == {"shield.separation_m": [2.5, 4.0], "shield.profile": [None, "ramming"]}
@@ -149,6 +135,9 @@ def test_what_is_no_results_folder_is_refused(tmp_path):
             read_run(tmp_path)
     (tmp_path / "results.json").write_text('{"command": "ablate", "settings": {}}')
     with pytest.raises(ConfigError, match="of another version"):
+        read_run(tmp_path)
+    (tmp_path / "games.jsonl").touch()
+    with pytest.raises(ConfigError, match=r"of steerclear 0\.8\.0 or earlier, whose games this version does not read"):
         read_run(tmp_path)
 
 

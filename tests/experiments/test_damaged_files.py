@@ -35,6 +35,7 @@ def encounters():
     cell |= {"delay_s": 0.0, "noise_m": 0.0, "current_mps": 0.0, "encounters": 200, "breached": 3, "avoidable": 0}
     cell |= {"unavoidable": 3, "not_judged": 0, "deadlocked": 0, "changed_percent": 12.5, "goal_time_ratio": 1.1}
     cell |= {"reversals_per_min": 0.3, "decision_us": None, "started_outside": 190, "breaches_outside": 1}
+    cell |= {"never_arrived_percent": 0.0, "inactive_percent": None}
     cells = [cell, {**cell, "guard": "none", "breached": 150}, {**cell, "family": "rammer_1"}]
     return {"command": "encounters", "settings": {}, "versions": {"steerclear": "0.1.0"}, "cells": cells}
 

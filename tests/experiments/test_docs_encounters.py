@@ -2,7 +2,7 @@
 
 import pytest
 from steerclear.experiments.docs import price_page, write_pages
-from steerclear.experiments.docs_encounters import cells_of, comparison_page, contests_of
+from steerclear.experiments.docs_encounters import best_of, comparison_page, pool
 from steerclear.shield.exceptions import ConfigError
 
 SETTINGS = {"radius_m": 2.5, "delay_s": 0.0, "noise_m": 0.0, "current_mps": 0.0, "seed": 7}
@@ -12,7 +12,9 @@ def cell(guard, family, breached=0, avoidable=0, changed=5.0, n=100, own="heron"
     return {
         "guard": guard, "family": family, "own": own, "other": "heron", "encounters": n, "breached": breached,
         "avoidable": avoidable, "unavoidable": breached - avoidable, "not_judged": 0, "deadlocked": 0,
-        "changed_percent": changed, "goal_time_ratio": 1.1, "reversals_per_min": 2.0, "decision_us": 9.0, **more,
+        "changed_percent": changed, "goal_time_ratio": 1.1, "reversals_per_min": 2.0, "decision_us": 9.0,
+        "started_outside": n, "breaches_outside": breached, "never_arrived_percent": 0.0, "inactive_percent": 90.0,
+        **more,
     }  # fmt: skip
 
 
@@ -31,65 +33,42 @@ def both(first="head_on", second="rammer_1"):
     )  # fmt: skip
 
 
-def one_contest(*contents):
-    (contest,) = contests_of(each for one in contents for each in cells_of(one))
-    return contest
+def page_of(folder, *contents):
+    return comparison_page(contents, folder)[1]
 
 
 def test_counts_add_up_and_means_are_weighted():
-    contest = one_contest(
-        content(
-            cell("a", "head_on", breached=3, avoidable=1, changed=10.0, n=100),
-            cell("a", "rammer_1", breached=2, changed=40.0, n=300, goal_time_ratio=None),
-        )
+    cells = (
+        cell("a", "head_on", breached=3, avoidable=1, changed=10.0, n=100),
+        cell("a", "rammer_1", breached=2, changed=40.0, n=300, goal_time_ratio=None),
     )
-    figures = contest.totals["a"]
+    figures = pool(cells)
     assert (figures["encounters"], figures["breached"], figures["avoidable"]) == (400, 5, 1)
     assert figures["changed_percent"] == pytest.approx((10 * 100 + 40 * 300) / 400)
     assert figures["goal_time_ratio"] == pytest.approx(1.1)
-    assert figures["breached_upper"] > 5 / 400
 
 
-def test_the_page_is_made_of_older_results_beside_newer_ones(tmp_path):
-    newer = content(
-        cell("new", "head_on", never_arrived_percent=40.0), cell("new", "rammer_1", never_arrived_percent=0.0)
-    )
-    (page,) = (path for path in write_pages([both(), newer], tmp_path) if path.name == "comparison.md")
-    lines = page.read_text().splitlines()
-    heads, *rows = [[part.strip() for part in line.split("|")] for line in lines if line.count("|") == 14]
-    column = heads.index("never arrived")
-    assert {row[1].strip("*"): row[column] for row in rows[1:]} == {
-        "none": "",
-        "cautious": "",
-        "bold": "",
-        "new": "20.0 %",
-    }
-
-
-def test_best_is_safe_first_then_gentle():
-    assert one_contest(both()).winner == "cautious"
+def test_best_is_safe_first_then_gentle(tmp_path):
+    assert ": **cautious**." in page_of(tmp_path, both())
     gentle = content(cell("gentle", "head_on", changed=30.0), cell("gentle", "rammer_1", changed=50.0))
-    assert one_contest(both(), gentle).winner == "gentle"
-    assert one_contest(content(cell("none", "head_on"))).winner is None
+    assert ": **gentle**." in page_of(tmp_path, both(), gentle)
+    assert best_of({"none": pool([cell("none", "head_on")])}) is None
 
 
 def test_breaches_nobody_judged_are_not_taken_for_unavoidable(tmp_path):
     unjudged = cell("hidden", "head_on", breached=1, changed=1.0, not_judged=1, unavoidable=0)
-    asked = content(unjudged, cell("open", "head_on", changed=90.0))
-    contest = one_contest(asked)
-    assert contest.winner == "open"
-    assert contest.totals["hidden"]["avoidable_upper"] == contest.totals["hidden"]["breached_upper"]
-    assert "| hidden | 100 | 0 to 1 [" in comparison_page([asked], tmp_path)[1]
+    text = page_of(tmp_path, content(unjudged, cell("open", "head_on", changed=90.0)))
+    assert ": **open**." in text
+    assert "| hidden | 100 | 0 to 1 [4.7 %] | 0 | 1 | 1 [4.7 %] |" in text
 
 
-def test_only_families_that_all_met_count():
+def test_only_families_that_all_met_count(tmp_path):
     extra = content(cell("bold", "crossing_left", breached=50), cell("late", "head_on", changed=2.0))
-    contest = one_contest(both(), extra)
-    assert contest.families == ("head_on",)
-    assert set(contest.left_out) == {"rammer_1", "crossing_left"}
-    assert contest.totals["bold"]["encounters"] == 100
-    fewer = content(cell("late", "head_on", n=50))
-    assert one_contest(both(), fewer).families == ()
+    text = page_of(tmp_path, both(), extra)
+    assert "Families: head_on; seed 7. Not met equally by all guards and left out: rammer_1, crossing_left." in text
+    assert "| **bold** | 100 |" in text
+    with pytest.raises(ConfigError, match="no family that all guards met"):
+        page_of(tmp_path, both(), content(cell("late", "head_on", n=50)))
 
 
 def test_the_page_shows_what_the_results_say(tmp_path):
@@ -97,25 +76,25 @@ def test_the_page_shows_what_the_results_say(tmp_path):
         path for path in write_pages([both()], tmp_path) if path.name in ("comparison.md", "comparison.png")
     )
     text = page.read_text()
-    assert (
-        "Best (fewest avoidable or unjudged, then fewest breached, then fewest commands changed): **cautious**" in text
-    )
-    assert "| **cautious** | 200 | 0 [1.5 %] | 0 | 0 | 0 [1.5 %] | 50.0 % |" in text
+    assert "Best (fewest avoidable or unjudged, then fewest breached, then fewest commands changed): **caut" in text
+    assert "| **cautious** | 200 | 0 [1.5 %] | 0 | 0 | 0 [1.5 %] | 0 [1.5 %] | 50.0 % |" in text
     assert "| rammer_1 | 60, 0 % | 0, 60 % | 1, 3 % |" in text
     assert "steerclear 9.9" in text
     assert picture.read_bytes()[:4] == b"\x89PNG"
 
 
 def test_of_one_guard_every_family_has_its_figures(tmp_path):
-    outside = {"started_outside": 1000, "breaches_outside": 0}
     cells = [
-        cell("shield", "head_on", n=1000, never_arrived_percent=0.0, **outside),
+        cell("shield", "head_on", n=1000),
         cell("shield", "at_rest", breached=99, avoidable=90, changed=60.0, never_arrived_percent=2.0),
     ]
-    lines = comparison_page([content(*cells)], tmp_path)[1].splitlines()
-    assert "| head_on | 0 [0.3 %] | 0 [0.3 %] | 0 | 1,000 | 0 [0.3 %] | 5.0 % | 1.10 | 0.00 % |" in lines
-    assert "| at_rest | 99 [100 %] | 90 [94 %] | 9 |  |  | 60.0 % | 1.10 | 2.00 % |" in lines
-    assert not any(line.startswith("Encounters breached, and") for line in lines)
+    lines = page_of(tmp_path, content(*cells)).splitlines()
+    assert any(
+        line.startswith("| head_on | 1,000 | 0 [0.3 %] | 0 | 0 | 0 [0.3 %] | 0 [0.3 %] | 5.0 % |") for line in lines
+    )
+    assert any(
+        line.startswith("| at_rest | 100 | 90 [94 %] | 9 | 0 | 99 [100 %] | 99 [100 %] | 60.0") for line in lines
+    )
     assert lines[0] == "# Encounters with shield"
     assert not any("Best" in line or "**shield**" in line for line in lines)
 

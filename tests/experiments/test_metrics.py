@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from json_keys import KEYS, undocumented
 from steerclear.env.record import read_meta
-from steerclear.experiments import docs_keys, metrics
+from steerclear.experiments import metrics
 from steerclear.experiments.ablation import AblationSettings, results_of, write_results
 from steerclear.experiments.docs import keys_page
 from steerclear.experiments.metrics import Goal, Metric, check, game_metrics_of
@@ -41,7 +42,7 @@ def test_a_metric_of_one_line_reaches_rows_table_report_and_keys(monkeypatch, tm
     assert "lowest speed of an own boat" in page
     assert interval_text(figures["on"]) in page
     content = json.loads((tmp_path / "results.json").read_text())
-    assert docs_keys.undocumented({"pairings": content["pairings"]}, docs_keys.KEYS["ablate"]) == []
+    assert undocumented({"pairings": content["pairings"]}, KEYS["ablate"]) == []
 
 
 THROWS = [Metric("hit", "share", "hits", "", "whether it hit"), Metric("off_m", "mean", "off by", "m", "distance")]

@@ -120,30 +120,24 @@ def broken():
     raise ImportError("no such thing")
 
 
-def test_entry_points_bring_platforms_and_broken_ones_are_told(apart, monkeypatch, caplog):
-    gig = replace(get_platform("heron"), name="gig")
-    monkeypatch.setattr(foreign, "entry_points", lambda group: [Point(broken), Point(lambda: gig)])
-    foreign.load_others.cache_clear()
-    assert get_platform("gig") == gig
-    assert "platforms of package.boats cannot be loaded: ImportError" in caplog.text
-    foreign.load_others.cache_clear()
+GIG = replace(get_platform("heron"), name="gig")
+BUOY = Barrier("buoy", lambda x, y, ahead, values: math.hypot(x, y) - 3.0)
 
 
-def test_entry_points_bring_barriers_and_broken_ones_are_told(monkeypatch, caplog):
+@pytest.mark.parametrize(
+    ("kind", "others", "found"),
+    [
+        ("platforms", [Point(lambda: GIG)], lambda: get_platform("gig") == GIG),
+        ("barriers", [Point(lambda: BUOY)], lambda: get_barrier("buoy") is BUOY),
+        ("readers", [], lambda: isinstance(reader_of(MctfEnv("aamas2024")), MctfReader)),
+    ],
+)
+def test_entry_points_bring_what_they_name_and_broken_ones_are_told(apart, monkeypatch, caplog, kind, others, found):
     monkeypatch.setattr(barriers, "BARRIERS", {})
-    buoy = Barrier("buoy", lambda x, y, ahead, values: math.hypot(x, y) - 3.0)
-    monkeypatch.setattr(foreign, "entry_points", lambda group: [Point(broken), Point(lambda: buoy)])
+    monkeypatch.setattr(foreign, "entry_points", lambda group: [Point(broken), *others])
     foreign.load_others.cache_clear()
-    assert get_barrier("buoy") is buoy
-    assert "barriers of package.boats cannot be loaded: ImportError" in caplog.text
-    foreign.load_others.cache_clear()
-
-
-def test_entry_points_bring_readers_and_broken_ones_are_told(apart, monkeypatch, caplog):
-    monkeypatch.setattr(foreign, "entry_points", lambda group: [Point(broken)])
-    foreign.load_others.cache_clear()
-    assert isinstance(reader_of(MctfEnv("aamas2024")), MctfReader)
-    assert "readers of package.boats cannot be loaded: ImportError" in caplog.text
+    assert found()
+    assert f"{kind} of package.boats cannot be loaded: ImportError" in caplog.text
     foreign.load_others.cache_clear()
 
 

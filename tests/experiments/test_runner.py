@@ -291,20 +291,6 @@ def test_the_digest_of_the_code_changes_with_sources_tables_and_versions(tmp_pat
     assert digest() != seen[-1]
 
 
-@pytest.mark.parametrize(
-    ("given", "text"),
-    [
-        (("slurm", None, None), "unknown engine 'slurm'; choose one of pool, ray"),
-        (("pool", "auto", None), "--address is of a Ray cluster; add --engine ray"),
-        (("ray", "auto", 3), "leave out --jobs, or --address"),
-        (("pool", None, 0), "--jobs must be at least 1"),
-    ],
-)
-def test_what_does_not_go_together_is_refused(given, text):
-    with pytest.raises(ConfigError, match=text):
-        workers_of(*given)
-
-
 def test_number_of_processes_and_the_extra_of_clusters(monkeypatch):
     assert processes_of(None) == provenance.available_cores() >= 1
     assert processes_of(3) == workers_of("pool", None, 3) == 3

@@ -45,11 +45,3 @@ def test_what_is_no_interrupt_is_not_taken_for_one(monkeypatch):
     monkeypatch.setitem(sys.modules, "steerclear.experiments.cli", Loading(broken))
     with pytest.raises(RuntimeError, match="broken"):
         main()
-
-
-def test_the_command_line_runs(monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", ["steerclear", "--version"])
-    with pytest.raises(SystemExit) as left:
-        main()
-    assert left.value.code == 0
-    assert capsys.readouterr().out.startswith("steerclear ")

@@ -3,14 +3,20 @@
 import json
 import textwrap
 
-import pytest
+from json_keys import KEYS, undocumented
 from steerclear.experiments import tournament
-from steerclear.experiments.docs_keys import KEYS, undocumented
-from steerclear.experiments.rankings import qualifying_table, seats
-from steerclear.experiments.runner import job_id
-from steerclear.experiments.tournament import TournamentSettings, label, names_of, play_game, results_of
-from steerclear.experiments.tournament_pages import chosen_games, subtitle, write_html, write_markdown
-from steerclear.shield.exceptions import ConfigError
+from steerclear.experiments.runner import execute, job_id
+from steerclear.experiments.tournament import (
+    TournamentSettings,
+    label,
+    most_changed,
+    names_of,
+    play_game,
+    results_of,
+    subtitle,
+    write_html,
+    write_markdown,
+)
 
 SHORT = {"max_time_s": 1.0}
 POLLUTER = """
@@ -50,7 +56,7 @@ def settings(**changed):
 
 
 def play(chosen, folder, resume=False):
-    return tournament.play(chosen, folder, 1, resume)
+    return execute(chosen.experiment(), folder, 1, resume)
 
 
 def without_times(rows):
@@ -59,19 +65,19 @@ def without_times(rows):
 
 
 def test_every_pair_meets_on_both_sides_from_the_same_seeds():
-    jobs = settings(states=("off", "meo"), repetitions=2, seed=7).final(("ohto", "meo", "hold"))
+    jobs = settings(states=("off", "meo"), repetitions=2, seed=7).experiment().jobs
     assert len(jobs) == len({job_id(job) for job in jobs}) == 3 * 2 * 2 * 2
     assert {(job["game"], job["seed"]) for job in jobs} == {(0, 7), (1, 8)}
     met = {(job["own"], job["opponent"]) for job in jobs}
     assert met == {(b, r) for b, r in met} | {(r, b) for b, r in met}
-    covered = [job for job in jobs if job["state"] == "meo" and job["shield"] is not None]
-    assert {job["own"] for job in covered} == {"meo"}
+    covered = [(job["own"], job["opponent"]) for job in jobs if job["shield"] is not None]
+    assert {own for own, _ in covered} == {"meo"}
     assert all(job["shield"] is None and job["opponent_shield"] is None for job in jobs if job["state"] == "off")
 
 
 def test_an_interrupted_tournament_ends_with_the_same_table(tmp_path, monkeypatch):
     whole = play(settings(), tmp_path / "whole")
-    assert len(whole.rows) == settings().expected == 6
+    assert len(whole.rows) == 6
     count = iter(range(100))
 
     def killed_at_the_third(job):
@@ -92,39 +98,31 @@ def test_an_interrupted_tournament_ends_with_the_same_table(tmp_path, monkeypatc
 
 
 def test_results_rows_report_and_page_hold_what_they_say(tmp_path):
-    run = play(settings(), tmp_path / "run")
-    content = json.loads(json.dumps(results_of(run, settings()), default=str))
-    assert undocumented(content, KEYS["tournament"]) == []
-    assert undocumented(run.rows[0], KEYS["rows of tournament"]) == []
-    html = write_html(content, tmp_path / "report.html").read_text()
-    name, text, pictures = write_markdown(content, tmp_path)
-    assert (name, pictures) == ("tournament_aamas2024.md", [])
-    for words in ("Table 3, with the penalty: no shields", "Table 4, penalty off", "Alpha-rank"):
-        assert words in html
-        assert words in text
-    tables = html.split('<section class="tables">')[1]
-    wide = tables.count('<section class="card wide"><h3>')  # which scroll
-    assert wide == tables.count("<h3>") > 3, "tables of many teams stay within their cards"
-    assert [len(jobs) for _, jobs in chosen_games(run, None)] == [1, 1]
-
-
-def test_games_off_and_on_are_chosen_side_by_side_and_drawn(tmp_path):
     chosen = settings(teams=("ohto", "hold"), states=("off", "all"))
     run = play(chosen, tmp_path / "run")
-    content = results_of(run, chosen)
-    (words, games), *_ = chosen_games(run, ("off", "all"))
-    assert words.startswith("best: most captures for the fewest hits (ohto against hold, repetition 0)")
-    assert [names_of(job)["state"] for job in games] == ["off", "all"]
+    content = json.loads(json.dumps(results_of(run, chosen), default=str))
+    assert undocumented(content, KEYS["tournament"]) == []
+    assert undocumented(run.rows[0], KEYS["rows of tournament"]) == []
     assert content["prices"][0]["games"] == 2
-    _, text, (picture,) = write_markdown(content, tmp_path)
-    assert picture.read_bytes()[1:4] == b"PNG"
-    assert "## Price of safety: hits a game" in text
-    assert '<img alt="net captures against collisions' in write_html(content, tmp_path / "report.html").read_text()
+    html = write_html(content, tmp_path / "report.html").read_text()
+    name, text, (picture,) = write_markdown(content, tmp_path)
+    assert (name, picture.read_bytes()[1:4]) == ("tournament_aamas2024.md", b"PNG")
+    for words in ("Standings, no shields", "Standings, all shielded", "Price of safety, a game"):
+        assert words in html
+        assert words in text
+    assert '<img alt="net captures against collisions' in html
+    tables = html.split('<section class="tables">')[1]
+    wide = tables.count('<section class="card wide"><h3>')  # which scroll
+    assert wide == tables.count("<h3>") >= 3, "tables of many teams stay within their cards"
+    words, jobs = most_changed(run, chosen.compared)
+    assert words == "most changed by the shield (ohto against hold, repetition 0)"
+    assert [names_of(job)["state"] for job in jobs] == ["off", "all"]
+    assert len(most_changed(run, None)[1]) == 1
 
 
 def test_a_polluter_changes_nothing_for_the_team_beside_it(tmp_path):
     clean, dirty = entry(tmp_path, "clean", CLEAN), entry(tmp_path, "dirty", POLLUTER)
-    jobs = settings(teams=(clean, dirty, "ohto"), rules={"max_time_s": 0.4}).final((clean, dirty, "ohto"))
+    jobs = settings(teams=(clean, dirty, "ohto"), rules={"max_time_s": 0.4}).experiment().jobs
     game = {(job["own"], job["opponent"]): job for job in jobs}
     before = play_game(game[clean, "ohto"])
     (beside,) = play_game(game[clean, dirty])
@@ -140,60 +138,6 @@ def test_a_team_that_ends_itself_is_named_and_stops_nothing(tmp_path):
     assert content["complete"]
     assert content["silent"] == ["quitter"]
     assert any("quitter failed" in words and "exit status 3" in words for words in content["warnings"])
-
-
-def made_up(captures):
-    """Games whose captures a function of both teams tells."""
-
-    def game(job):
-        row = {**names_of(job), "examined": job["examined"], "steps": 1}
-        for side, other in (("blue", "red"), ("red", "blue")):
-            row |= {f"{side}_captures": captures(row[side], row[other]), f"{side}_collisions": 0}
-        return [row]
-
-    return game
-
-
-def test_the_best_of_the_qualifying_go_on(tmp_path, monkeypatch):
-    monkeypatch.setattr(tournament, "play_game", made_up(lambda team, _: int(team in ("ohto", "hold"))))
-    chosen = settings(qualifying=True, finalists=2)
-    run = play(chosen, tmp_path / "run")
-    assert len(run.rows) == chosen.expected == 3 * 5 * 2 + 2
-    assert {row["blue"] for row in run.rows if row["phase"] == "final"} == {"ohto", "hold"}
-    again = play(chosen, tmp_path / "run", resume=True)
-    assert (again.resumed, again.rows) == (32, run.rows)
-
-
-def test_a_team_that_examines_others_too_is_scored_by_its_own_games_alone(tmp_path, monkeypatch):
-    """`medium` wins all ten of its own, and loses the games in which it examines others."""
-
-    def captures(team, other):
-        return 3 if team in ("ohto", "meo") and other == "medium" else 2 if team == "medium" else 0
-
-    monkeypatch.setattr(tournament, "play_game", made_up(captures))
-    chosen = settings(teams=("ohto", "meo", "medium", "easy"), qualifying=True, finalists=2)
-    run = play(chosen, tmp_path / "run")
-    table = seats([row for row in run.rows if row["phase"] == "qualifying"])
-    lines = {line["team"]: line for line in qualifying_table(table, ["off"], chosen.labels, 0.25)}
-    assert {line["games"] for line in lines.values()} == {10}
-    assert lines["medium"]["score"] == 1.6  # two games against itself are drawn
-    assert "medium" in {row["blue"] for row in run.rows if row["phase"] == "final"}
-
-
-@pytest.mark.parametrize(
-    ("changed", "text"),
-    [
-        ({"teams": ("ohto",)}, "give two or more"),
-        ({"teams": ("a/x.zip", "b/x.zip")}, "of different names"),
-        ({"states": ("metro",)}, "names 'metro', which does not play; did you mean meo"),
-        ({"states": ("off", "off")}, "give each state once"),
-        ({"repetitions": 0}, "must be 1 to 10,000"),
-        ({"finalists": 2}, "goes with --qualifying"),
-    ],
-)
-def test_bad_settings_are_refused(changed, text):
-    with pytest.raises(ConfigError, match=text):
-        settings(**changed)
 
 
 def test_labels_are_short_names(tmp_path):

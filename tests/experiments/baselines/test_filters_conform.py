@@ -125,7 +125,6 @@ def test_a_fleet_that_does_not_fit_is_refused(name):
         ("pl-cbf:alpha_per_s=0", "above 0, at most 10"),
         ("pl-cbf:alpha_per_s=nan", "give a number"),
         ("pl-cbf:horizon_s=true", "give a number"),
-        ("pl-cbf:pick=both", "choose area or nearest"),
         ("pl-cbf:separation_m=3", "set it with --radius"),
     ],
 )

@@ -6,6 +6,7 @@ import socket
 import threading
 
 import pytest
+from json_keys import KEYS, undocumented
 from steerclear.env.core import BatchedMctf
 from steerclear.experiments.cli import app
 from steerclear.experiments.deploy.demo import free_ports
@@ -15,7 +16,6 @@ from steerclear.experiments.deploy.preflight_file import check_drill, keep, meas
 from steerclear.experiments.deploy.proof import prove
 from steerclear.experiments.deploy.rules import game_config, game_obstacles, player_names, state_of
 from steerclear.experiments.deploy.run import deploy, preflight
-from steerclear.experiments.docs_keys import KEYS, undocumented
 from steerclear.experiments.sim_boats import AutopilotSettings, SimFleet
 from steerclear.shield.bridge.blackbox import LogReader, log_path
 from steerclear.shield.bridge.control_loop import Timing

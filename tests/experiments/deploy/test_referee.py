@@ -12,6 +12,7 @@ import time
 
 import numpy as np
 import pytest
+from json_keys import KEYS, undocumented
 from made_ticks import wait_for
 from steerclear import policies
 from steerclear.env.config import GameConfig
@@ -21,7 +22,6 @@ from steerclear.experiments.deploy import referee as referee_module
 from steerclear.experiments.deploy.demo import free_ports
 from steerclear.experiments.deploy.referee import Hearing, Referee
 from steerclear.experiments.deploy.rules import Umpire, game_config, player_names, state_of
-from steerclear.experiments.docs_keys import KEYS, undocumented
 from steerclear.experiments.sim_boats import AutopilotSettings, SimFleet
 from steerclear.shield.bridge.clock import ManualClock, MonotonicClock
 from steerclear.shield.bridge.feed import FeedReceiver, FeedSender, Fix, GameState

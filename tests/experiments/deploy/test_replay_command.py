@@ -7,10 +7,10 @@ import os
 import numpy as np
 import pytest
 from forged_logs import read_records, write_records
+from json_keys import KEYS, undocumented
 from logged_runs import Encounter, header_of, write_log
 from steerclear.env.record import load
 from steerclear.experiments.cli import app
-from steerclear.experiments.docs_keys import KEYS, undocumented
 from steerclear.shield import ShieldConfig
 from steerclear.shield.bridge.blackbox import McapWriter
 from typer.testing import CliRunner

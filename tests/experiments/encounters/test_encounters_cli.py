@@ -1,32 +1,23 @@
 import json
 from pathlib import Path
 
+import json_keys as keys
 import numpy as np
 import pytest
+from commands import run
 from rich.console import Console
 from steerclear.env.record import read_meta, validate
-from steerclear.experiments import cli
-from steerclear.experiments import docs_keys as keys
 from steerclear.experiments.console import ExitCode
 from steerclear.experiments.encounters import Conditions, draw, play, results
 from steerclear.experiments.encounters.replay import record_of
 from steerclear.experiments.encounters.report import cells_table
 from steerclear.experiments.encounters.results import Cell, goals_of
 from steerclear.experiments.encounters.scene import write_scene
-from typer.testing import CliRunner
+
+pytestmark = pytest.mark.usefixtures("elsewhere")
 
 USUAL = Conditions()
 SMALL = ["encounters", "--platform", "heron", "--family", "head_on,doorway", "--n", "3", "--workers", "1"]
-
-
-@pytest.fixture(autouse=True)
-def elsewhere(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "80")
-
-
-def run(*arguments):
-    return CliRunner().invoke(cli.app, [str(argument) for argument in arguments])
 
 
 def test_a_small_run_from_end_to_end_and_again():
@@ -85,31 +76,6 @@ def _breaching(measure_chunk):
         return columns
 
     return measured
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["--platform", "canoe"], "unknown platform"),
-        (["--platform", "a/b/c"], "own/other"),
-        (["--platform", ","], "names no platform"),
-        (["--family", "headon"], "did you mean 'head_on'"),
-        (["--guard", "wall"], "unknown safety filter"),
-        (["--n", "0"], "--n must be at least 1"),
-        (["--seed", "-1"], "--seed must be 0 or more"),
-        (["--noise", "9"], "noise_m is 9.0"),
-        (["--workers", "0"], "at least 1"),
-        (["--resume"], "--resume needs the --out"),
-        (["--scene", "missing.json"], "cannot read a scene from missing.json"),
-        (["--scene", "missing.json", "--radius", "4", "--n", "3"], "--n, --radius beside --scene: a scene file holds"),
-        (["--scene", "missing.json", "--jobs", "1", "--resume"], "--jobs, --resume beside --scene: scenes are played"),
-    ],
-)
-def test_bad_input_is_one_line_and_status_two(arguments, words):
-    done = run("encounters", *arguments)
-    assert done.exit_code == ExitCode.BAD_INPUT
-    assert words in done.output
-    assert "Traceback" not in done.output
 
 
 def test_a_scene_file_is_played_again():

@@ -123,7 +123,7 @@ def test_figures_of_made_up_encounters():
 
 
 def test_a_scene_file_plays_exactly_again(tmp_path):
-    conditions = Conditions(3.0, 0.2, 0.4, 0.1)
+    conditions = Conditions(0.2, 0.4, 0.1, radius_m=3.0)
     scenes = draw("sudden_turn", "surveyor", "heron", conditions, 8, 2, 1)
     path = write_scene(tmp_path / "scene.json", scenes, conditions, note="kept")
     again, same = read_scene(path)

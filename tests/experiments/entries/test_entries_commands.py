@@ -10,22 +10,12 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from steerclear.experiments import cli
+from commands import run
 from steerclear.experiments.console import ExitCode
-from typer.testing import CliRunner
+
+pytestmark = pytest.mark.usefixtures("elsewhere")
 
 TINY = ["--games", "1", "--max-time", "1", "--jobs", "1", "--judge", "none"]
-
-
-@pytest.fixture(autouse=True)
-def elsewhere(tmp_path, monkeypatch):
-    """Commands run in an empty folder, on a terminal of 80 columns."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "80")
-
-
-def run(*arguments):
-    return CliRunner().invoke(cli.app, [str(argument) for argument in arguments])
 
 
 def steerclear(*arguments, **options):
@@ -44,14 +34,6 @@ def test_an_entry_that_exits_forfeits_and_the_results_say_so(write_entry):
     assert "process ended: ended itself with exit status 0; its boats hold for the rest of the game" in words
     assert "exit status 0" in Path("out/report.html").read_text()
     assert "exit status 0" in done.stdout.replace("\n", " ")
-
-
-def test_an_entry_that_leaves_a_thread_ends_with_the_command(write_entry):
-    entry = write_entry("return 4", start="threading.Thread(target=time.sleep, args=(600,)).start()")
-    done = steerclear("evaluate", entry, "--opponents", "hold", *TINY, "--out", "out")
-    shown, said = done.communicate(timeout=200)
-    assert done.returncode == 0, said
-    assert "games" in shown
 
 
 def test_an_entry_that_does_not_answer_forfeits_after_the_time_given(write_entry):

@@ -5,22 +5,18 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from json_keys import KEYS, undocumented
 from steerclear.experiments import cli
 from steerclear.experiments.cli_entry import time_text
 from steerclear.experiments.console import ExitCode
-from steerclear.experiments.docs_keys import KEYS, undocumented
 from steerclear.experiments.entries.imports import imports_of
-from steerclear.experiments.entries.report_page import EntryGames, games_to_look_at, write_entry_page
+from steerclear.experiments.entries.report_page import EntryGames, entry_report, games_to_look_at
 from steerclear.experiments.provenance import available_cores
 from steerclear.policies.submissions.made_for import made_for
 from steerclear.shield.exceptions import PolicyError
 from typer.testing import CliRunner
 
-
-@pytest.fixture(autouse=True)
-def elsewhere(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "100")
+pytestmark = pytest.mark.usefixtures("elsewhere")
 
 
 def run(*arguments):
@@ -74,8 +70,9 @@ def test_one_boat_that_fails_is_said_first_and_named(write_entry):
     assert content["failed_steps"] == {"agent_1": 3}
 
 
-def test_an_entry_that_is_late_in_every_decision_is_said_and_no_success(write_entry):
-    entry = write_entry("time.sleep(0.5); return 4")
+def test_an_entry_that_is_late_in_every_decision_is_said_and_no_success(write_entry, monkeypatch):
+    monkeypatch.setattr("steerclear.experiments.entries.wrap.TRIED_S", 2.0)
+    entry = write_entry("time.sleep(0.35); return 4")
     done = run("check", entry, "--max-time", "2")
     assert done.exit_code == ExitCode.GOAL_MISSED, done.output
     assert "but all 2 decisions took longer than the game gives" in done.stdout.splitlines()[0]
@@ -113,7 +110,6 @@ def test_what_is_no_entry_is_one_line(tmp_path):
         (["check", "empty.zip"], "solution.py"),
         (["check", "gone.zip"], "there is no submission at"),
         (["check", "wants"], "more"),
-        (["report", "wants", "--looks", "7"], "--looks is 7; give 0 to 3"),
     ):
         done = run(*arguments)
         assert done.exit_code == ExitCode.BAD_INPUT, done.output
@@ -131,15 +127,13 @@ def test_a_report_is_a_page_with_the_games_to_look_at(write_entry):
         "40",
         "--jobs",
         "1",
-        "--looks",
-        "1",
         "--out",
         "out",
     ]
     done = run("report", entry, *settings)
     assert done.exit_code == ExitCode.OK, done.output
     page = Path("out/entry.html").read_text()
-    assert "Against each opponent" in page
+    assert "Sums of all games" in page
     assert "hold" in page
     links = [name for name in ("look_1.html", "report.html") if f'href="{name}"' in page]
     assert "report.html" in links
@@ -199,35 +193,40 @@ ROWS = [
 ]  # fmt: skip
 
 
-def test_figures_of_the_page_are_of_pairs_and_names_are_text(tmp_path):
-    settings = EntryGames(preset="mctf2026", own="us", opponents=("<them>",), games=4, shield={"separation_m": 4.0})
-    page = write_entry_page(ROWS, settings, tmp_path, [("a <look>", "x.html")], ["mind <this>"]).read_text()
-    figures = ("3 → 5", "6 → 0", "0 → 1", "5 → 0", ">0.33 [-2.00, 3.00]<", ">3<")
-    for words in (*figures, "&lt;them&gt;", "a &lt;look&gt;", "mind &lt;this&gt;"):
+@pytest.mark.parametrize(
+    ("zip_file", "more", "figures"),
+    [
+        ("", [], ("3 → 5", "6 → 0", "0 → 1", "5 → 0", ">0.33 [-2.00, 3.00]<", ">3<", "entry alone → shield round")),
+        (
+            "s.zip",
+            [row(0, False, 4, opponents=2, own="s.zip"), row(1, False, 0, mates=2, own="s.zip")],
+            (
+                "3 → 4 → 2",
+                "6 → 2 → 0",
+                "0 → 2 → 1",
+                "entry alone → shield in the zip → shield round the game",
+                ": 12 games in all",
+            ),
+        ),
+    ],
+)
+def test_figures_of_the_page_are_of_games_played_in_every_way_and_names_are_text(zip_file, more, figures, tmp_path):
+    told = {"own": "us", "opponents": ("<them>",), "games": 4, "shield": {"separation_m": 4.0}}
+    settings = EntryGames(preset="mctf2026", zip_file=zip_file, **told)
+    page = entry_report([*ROWS, *more], settings).write(tmp_path / "entry.html").read_text()
+    for words in (*figures, "&lt;them&gt;"):
         assert words in page, words
     assert "<them>" not in page
 
 
-def test_the_zip_stands_between_bare_and_the_shield_round_the_game(tmp_path):
-    """Only games that were played in every way count."""
-    settings = EntryGames(
-        preset="mctf2026", own="us", zip_file="s.zip", opponents=("<them>",), games=4, shield={"separation_m": 4.0}
-    )
-    rows = [*ROWS, row(0, False, 4, opponents=2, own="s.zip"), row(1, False, 0, mates=2, own="s.zip")]
-    page = write_entry_page(rows, settings, tmp_path, [], []).read_text()
-    assert "4 games against &lt;them&gt;; entry alone, shield in the zip, shield round the game: 12" in page
-    for words in ("3 → 4 → 2", "6 → 2 → 0", "0 → 2 → 1", "entry alone → shield in the zip → shield round the game"):
-        assert words in page, words
-
-
 def test_games_to_look_at_are_chosen_once_each():
     settings = EntryGames(preset="mctf2026", own="us", opponents=("<them>",), games=4, shield={"separation_m": 4.0})
-    chosen = games_to_look_at(ROWS, settings, 3)
+    chosen = games_to_look_at(ROWS, settings)
     assert [(words, off["game"]) for words, off, _ in chosen] == [
         ("most hits without the shield", 0),
         ("hits with the shield", 1),
     ]
-    assert games_to_look_at([ROWS[4], ROWS[5]], settings, 3) == []
+    assert games_to_look_at([ROWS[4], ROWS[5]], settings) == []
 
 
 def test_imports_are_read_without_running_anything(tmp_path):

@@ -13,12 +13,12 @@ import alone
 import numpy as np
 import pytest
 import steerclear.shield
+from json_keys import KEYS, undocumented
 from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
 from steerclear.experiments import cli
 from steerclear.experiments.console import ExitCode
-from steerclear.experiments.docs_keys import KEYS, undocumented
 from steerclear.experiments.entries.onboard.state import GameSpec
 from steerclear.experiments.entries.onboard.team_shield import ShieldedTeam, _tuples
 from steerclear.experiments.entries.package import STAND_INS, code, game_spec
@@ -284,13 +284,6 @@ def test_the_shields_own_sources_are_packed_as_they_are():
         text = files[f"shield/{name}"]
         assert text == (shield / name).read_text(encoding="utf-8")
         assert not re.search(r"^\s*(?:from|import) steerclear", text, re.MULTILINE), f"{name}: import relatively"
-
-
-def test_facts_are_of_the_game():
-    facts = game_spec("mctf2026", {"separation_m": 4.0})
-    assert facts["agent_ids"] == [f"agent_{i}" for i in range(6)]
-    assert (facts["size"], facts["power_s"], facts["decision_s"]) == ([160.0, 80.0], 120.0, 1.0)
-    assert facts["stops"] == [[], []]
 
 
 def test_a_distance_is_refused_where_the_field_has_no_room_and_told_where_the_game_counts_at_more(

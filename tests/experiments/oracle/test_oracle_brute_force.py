@@ -68,8 +68,8 @@ def compare(name, seed, size_m, rudders, macro, most, back=20):
 
 @pytest.mark.parametrize(("name", "size_m"), [("heron", 12.0), ("surveyor", 20.0), ("si", 25.0), ("di", 25.0)])
 def test_brute_force_finds_nothing_more(name, size_m):
-    found = [compare(name, seed, size_m, np.array([-1.0, 0.0, 1.0]), 5, most=3) for seed in range(5)]
-    assert sum(found) > 3
+    found = [compare(name, seed, size_m, np.array([-1.0, 0.0, 1.0]), 5, most=3) for seed in range(3)]
+    assert sum(found) > 2
 
 
 @pytest.mark.study

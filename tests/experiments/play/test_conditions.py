@@ -4,25 +4,20 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import json_keys as keys
 import numpy as np
 import pytest
-from steerclear.experiments import cli
-from steerclear.experiments import docs_keys as keys
+from commands import run
 from steerclear.experiments.ablation import AblationSettings
 from steerclear.experiments.console import ExitCode
 from steerclear.experiments.docs import write_pages
 from steerclear.experiments.play.conditions import CALM, Conditions, draw, words_of, words_of_settings
 from steerclear.experiments.play.spec import MatchSpec
 from steerclear.shield.exceptions import ConfigError
-from typer.testing import CliRunner
 
 ROUGH = Conditions(delay_s=0.3, noise_m=0.5, current_mps=0.3)
 TINY = ["--opponents", "hold", "--games", "1", "--max-time", "2", "--jobs", "1"]
 GIVEN = ["--delay", "0.3", "--noise", "0.5", "--current", "0.3"]
-
-
-def run(*arguments):
-    return CliRunner().invoke(cli.app, [str(argument) for argument in arguments])
 
 
 @pytest.mark.parametrize("name", ["delay_s", "noise_m", "current_mps"])
@@ -97,22 +92,6 @@ def test_evaluate_and_play_take_them_too(tmp_path, monkeypatch):
     content = json.loads(Path("a.json").read_text())
     assert content["settings"]["conditions"]["delay_s"] == 0.3
     assert keys.undocumented(content, keys.KEYS["play"]) == []
-
-
-@pytest.mark.parametrize("command", [["ablate"], ["evaluate", "medium"], ["play"]])
-@pytest.mark.parametrize(
-    ("option", "value"),
-    [("--delay", "nan"), ("--noise", "-1"), ("--current", "1e9"), ("--delay", "inf"), ("--current", "1.5")],
-)
-def test_bad_input_is_one_error_with_its_remedy(command, option, value, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "200")
-    done = run(*command, option, value)
-    assert done.exit_code == ExitCode.BAD_INPUT
-    assert done.stderr.count("error") <= 1
-    assert len(done.stderr.strip().splitlines()) == 1
-    assert "; give " in done.stderr
-    assert not (tmp_path / "results").exists()
 
 
 def test_settings_of_a_shield_in_words():

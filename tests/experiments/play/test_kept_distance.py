@@ -25,19 +25,6 @@ def test_it_is_the_games_unless_one_is_given_or_the_usual_is_larger(preset, rule
     assert {**found, **asked} == found
 
 
-@pytest.mark.parametrize(
-    "words",
-    [("ablate",), ("evaluate", "easy", "--shield"), ("play", "--shield"), ("tournament", "--teams", "easy,medium")],
-)
-def test_a_distance_that_the_field_has_no_room_for_is_refused(words, tmp_path):
-    asked = ("--separation", "41", "--preset", "aamas2024")
-    place = () if words[0] == "play" else ("--out", str(tmp_path / "x"))
-    result = CliRunner().invoke(app, [*words, *asked, *place])
-    assert result.exit_code == 2
-    assert "the shorter side of the field, 40 m" in result.output
-    assert not (tmp_path / "x").exists()
-
-
 def test_the_whole_shorter_side_is_allowed():
     assert check_shield({"separation_m": 40.0}, GameConfig.preset("aamas2024")).separation_m == 40.0
 

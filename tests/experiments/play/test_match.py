@@ -5,14 +5,12 @@ import numpy as np
 import pytest
 from steerclear import policies
 from steerclear.env.config import GameConfig
-from steerclear.env.record import GameRecorder, read_meta
+from steerclear.env.record import read_meta
 from steerclear.env.render import Arena, Picture, Scene
 from steerclear.env.render.boats import boats_in_breach
 from steerclear.experiments.cli_games import STEERING
-from steerclear.experiments.play import match, recorder
-from steerclear.experiments.play.match import Match, play_match
+from steerclear.experiments.play.match import Match, play_match, read_infos
 from steerclear.experiments.play.openings import GAP_M, opening
-from steerclear.experiments.play.recorder import PlayingEnv, live_view, read_infos
 from steerclear.experiments.play.spec import MatchSpec
 from steerclear.policies.entrants.play import EntrantTeam
 from steerclear.policies.keyboard import AHEAD, BACK, LEFT, RIGHT
@@ -228,41 +226,6 @@ def test_a_policy_that_reads_infos_gets_them_in_a_match():
     game.play()
     game.close()
     assert game.env.infos() == {}
-
-
-class Recorded:
-    """The recorder of the library, in the place of a match's recorder."""
-
-    def __init__(self, game, meta):
-        self._game, self._recorder = game, GameRecorder()
-        self._recorder.start(game, meta)
-        self.finish = self._recorder.finish
-
-    def step(self, *given):
-        self._recorder.step(self._game, *given)
-
-
-def test_a_record_is_the_same_with_infos_and_by_the_library(monkeypatch):
-    monkeypatch.setattr(recorder, "FIRST_ROWS", 2)  # so that it has to make room
-    lean = match.play_match(SPEC).record
-    monkeypatch.setattr(match, "read_infos", lambda teams: True)
-    monkeypatch.setattr(match, "Recorder", Recorded)
-    whole = match.play_match(SPEC).record
-    assert set(lean) == set(whole)
-    for name in lean:
-        assert lean[name].dtype == whole[name].dtype
-        np.testing.assert_array_equal(lean[name], whole[name])
-
-
-def test_a_live_view_is_of_this_moment():
-    env = PlayingEnv("aamas2024")
-    env.reset(seed=1)
-    live = live_view(env.core)
-    for _ in range(3):
-        env.step(dict.fromkeys(env.agents, (1.0, 20.0)))
-        view = env.view()
-        for name in vars(live):
-            np.testing.assert_array_equal(getattr(live, name), getattr(view, name))
 
 
 def drawn(record, **changes):

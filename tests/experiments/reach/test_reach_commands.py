@@ -53,10 +53,9 @@ def test_a_solved_table_is_cached_shown_drawn_and_checked(tiny, tmp_path):
     assert [one.name for one in path.parent.iterdir()] == [path.name]
     assert "from which 2.5 m cannot be kept" in done.output
     assert read_table(path).card.checked_radii_m == (2.5,)
-    shown = run("show", *boats, "--other-may", "cooperative", "--picture", "sets.png")
+    shown = run("show", *boats, "--other-may", "cooperative")
     assert shown.exit_code == ExitCode.OK, shown.output
     assert "margin on the value" in shown.output
-    assert (tmp_path / "sets.png").read_bytes()[1:4] == b"PNG"
     assert max(map(len, shown.output.splitlines())) <= 80
 
 
@@ -73,34 +72,10 @@ def interrupt(*_):
     raise KeyboardInterrupt
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["--own", "canoe", "--other", "heron"], "canoe"),
-        (["--own", "si", "--other", "heron"], "run through as pursuers instead"),
-        (["--own", "heron", "--other", "heron", "--other-may", "help"], "choose one of worst-case, cooperative"),
-        (["--own", "heron", "--other", "heron", "--radius", "5.5"], "choose one within"),
-        (["--own", "heron", "--other", "heron", "--horizon", "nan"], "make it finite"),
-    ],
-)
-def test_bad_input_is_one_line(arguments, words):
-    failed = run("solve", *arguments)
-    assert failed.exit_code == ExitCode.BAD_INPUT
-    assert failed.output.startswith("error: ")
-    assert words in flat(failed.output)
-
-
 def test_a_missing_table_names_the_command():
     failed = run("show", "--own", "large_usv", "--other", "heron")
     assert failed.exit_code == ExitCode.BAD_INPUT
     assert "steerclear reach solve --own large_usv --other heron --other-may worst-case" in flat(failed.output)
-    shown = run("show", "--own", "heron", "--other", "heron", "--radius", "3")
-    assert shown.exit_code == ExitCode.BAD_INPUT
-    assert "give --picture FILE as well" in shown.output
-    for radius in ("-1", "300"):
-        drawn = run("show", "--own", "heron", "--other", "heron", "--radius", radius, "--picture", "sets.png")
-        assert drawn.exit_code == ExitCode.BAD_INPUT
-        assert "choose one within" in drawn.output
     other = run("show", "--own", "surveyor", "--other", "heron", "--file", HERON)
     assert other.exit_code == ExitCode.BAD_INPUT
     assert "is left as it is: name that table's boats, or leave --file out" in flat(other.output)

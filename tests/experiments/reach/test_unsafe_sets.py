@@ -4,9 +4,9 @@ import json
 import math
 
 import pytest
+from json_keys import KEYS, undocumented
 from steerclear.experiments import cli
 from steerclear.experiments.docs import write_pages
-from steerclear.experiments.docs_keys import KEYS, undocumented
 from steerclear.experiments.reach import sets
 from steerclear.experiments.reach.pages import sets_goals
 from steerclear.experiments.reach.sets import (
@@ -78,15 +78,6 @@ def test_a_shield_that_looks_up_the_table_is_not_judged_by_what_it_misses(tmp_pa
     assert not json.loads(file.read_text())["looked_up"]
     write_pages([json.loads(file.read_text())], tmp_path)
     assert "this very table" not in (tmp_path / "unsafe_sets.md").read_text()
-
-
-@pytest.mark.parametrize("setting", ["separation_m=2", "buffer_m=0", "position_error_m=0.3", "delay_s=0.5"])
-def test_settings_that_would_compare_two_questions_are_refused(setting, tmp_path):
-    result = compare("--shield-set", setting, "--json", str(tmp_path / "sets.json"))
-    assert result.exit_code == 2
-    assert result.output.startswith(f"error: {setting.partition('=')[0]} ")
-    assert "--radius" in result.output
-    assert not list(tmp_path.iterdir())
 
 
 def test_bars_judge_the_worst_pair():

@@ -3,9 +3,9 @@ import re
 import socket
 
 import pytest
+from json_keys import KEYS, undocumented
 from steerclear.env.record import load
 from steerclear.experiments.cli import app
-from steerclear.experiments.docs_keys import KEYS, undocumented
 from steerclear.experiments.sim_boats import SimFleet
 from steerclear.experiments.sim_boats.demo import demo_fleet, demo_text
 from steerclear.experiments.sim_boats.faults import Incident, parse_incident

@@ -1,5 +1,0 @@
-"""Compiled functions of the experiments."""
-
-from steerclear.shield.jit import kernel
-
-__all__ = ["kernel"]
