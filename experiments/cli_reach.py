@@ -93,7 +93,7 @@ def show(
     other_may: OtherMay = "worst-case",
     file: Annotated[Path | None, o.option("FILE", "A table file instead of the installed one.")] = None,
 ) -> None:
-    """Show a table's card: how it was made, what it is worth, the areas in which a radius cannot be kept."""
+    """Show a table's card: how it was made, how good it is, the areas in which a radius cannot be kept."""
     if file is None:
         table = F.load_table(boats.own, boats.other, other_may)
     else:
