@@ -9,7 +9,7 @@ from steerclear.shield.platforms import layout as L
 
 FIELD = (0.0, 0.0, 160.0, 80.0)
 CORNER = np.array([160.0, 0.0])
-GAMES, STEPS = 40, 700
+GAMES, STEPS = 96, 800
 
 
 def press(platform, boats):
