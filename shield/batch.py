@@ -19,7 +19,7 @@ from .masks import passing
 from .model import boats_of
 from .platforms import Platform
 from .platforms import layout as L
-from .shield import NOMINAL, barriers_of, write_seen
+from .shield import NOMINAL, barriers_of
 from .surroundings import OPEN_WATER, Surroundings
 
 
@@ -186,7 +186,10 @@ class BatchedShield:
             raise FleetError(f"a boat's position, heading, speed, thrust or rudder is not finite or beyond {LARGEST:g}")
         if (np.abs(state[:, :, L.SPEED]) > LARGEST_SPEED_MPS).any():
             raise FleetError(f"a boat's speed is beyond {LARGEST_SPEED_MPS:g} m/s; no boat of a game goes so fast")
-        write_seen(self._deciders.scene.given, state, ours, visiting, driven)
+        given = self._deciders.scene.given
+        given[:, :, : L.N_STATE], given[:, :, W.OURS] = state, ours
+        given[:, :, W.VISITING] = 0.0 if visiting is None else visiting
+        given[:, :, W.DRIVEN :] = np.nan if driven is None else driven
 
     def filter_for(self, team: int, shield_autopilot: bool = True) -> Any:
         """Command filter for a batched game: ``step(actions, command_filter=shield.filter_for(0))``.

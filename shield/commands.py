@@ -6,14 +6,14 @@ Commands are stored as given, so that one that is safe passes bit for bit.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import hint_at_degrees, say_once, shaped
 from .exceptions import FleetError
-from .jit import Array, BoolArray
+from .jit import Array, BoolArray, kernel
 from .workspace import LARGEST_COMMAND
 
 ROUNDING_MPS = 1e-6
@@ -21,6 +21,15 @@ ROUNDING_MPS = 1e-6
 
 LARGEST_HEADING_RAD = 1e6
 """Absolute headings beyond this are no directions, rad: turns so many that the angle left in the number is lost."""
+
+
+@kernel
+def _any_beyond(values: Array, who: BoolArray, highest_mps: Array) -> bool:
+    """Whether a speed of boats of ``who`` is beyond what their platforms do."""
+    for i in range(values.shape[0]):
+        if who[i] and (values[i, 0] > highest_mps[i] + ROUNDING_MPS or values[i, 0] < -ROUNDING_MPS):
+            return True
+    return False
 
 
 @dataclass(frozen=True)
@@ -106,7 +115,13 @@ class Commands:
         if not self.relative:
             rows = np.stack([rows[:, 0], np.radians(heading_deg[changed] + rows[:, 1])], axis=1)
         values[changed] = rows
-        return replace(self, values=values)
+        return self._alike(values)
+
+    def _alike(self, values: Array) -> Commands:
+        """Commands of the same frame, whose values need no check: many a decision makes some."""
+        made = object.__new__(Commands)
+        made.__dict__.update(self.__dict__, values=values)
+        return made
 
     def within(
         self, names: tuple[str, ...], controlled: BoolArray, highest_mps: Array
@@ -116,12 +131,10 @@ class Commands:
         No platform is sent astern: none has a speed below 0 in its model. What is no command at all (not finite, or
         beyond `LARGEST_COMMAND`) is left to the decision, which holds those boats.
         """
-        if self.of_game or len(self) == 0:
+        if self.of_game or not _any_beyond(self.values, controlled, highest_mps):
             return self, None
         speed = self.values[:, 0]
         cut: BoolArray = controlled & ((speed > highest_mps + ROUNDING_MPS) | (speed < -ROUNDING_MPS))
-        if not cut.any():
-            return self, None
         cut &= (np.abs(self.values) <= LARGEST_COMMAND).all(axis=1)
         if not cut.any():
             return self, None
@@ -138,7 +151,7 @@ class Commands:
             far = cut & (np.abs(values[:, 1]) > 180.0)
             half = np.copysign(180.0, values[far, 1])
             values[far, 1] = np.fmod(values[far, 1] + half, 360.0) - half
-        return replace(self, values=values), cut
+        return self._alike(values), cut
 
 
 def _rows(values: ArrayLike) -> Array:

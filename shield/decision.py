@@ -161,6 +161,13 @@ class Decisions:
     barriers: tuple[str, ...] = ()  # names of the registered barriers that are kept
     area: tuple[float, float, float, float] | None = None  # xmin, ymin, xmax, ymax of the field, m; None: there is none
 
+    @classmethod
+    def made(cls, **fields: Any) -> Decisions:
+        """One of all its fields, whose values need no check: a decision is made at every step."""
+        made = object.__new__(cls)
+        made.__dict__.update(fields)
+        return made
+
     def __len__(self) -> int:
         return len(self.reason)
 
@@ -204,11 +211,7 @@ class Decisions:
         )
 
     def _place(self, index: Any) -> int:
-        """The place of a boat in the fleet, by its name or place: no fraction, mask, True or False.
-
-        Raises:
-            FleetError: there is no such boat.
-        """
+        """The place of a boat in the fleet, by its name or place: no fraction, mask, True or False."""
         names = self.fleet.names
         if isinstance(index, str):
             if index in names:

@@ -71,19 +71,28 @@ def _whole_program() -> Any:
     return None
 
 
+ROOT = Path(__file__).parent.parent
+
+
+def _beside(file: str) -> Path | None:
+    """The folder whose sources a function of that file may hang on besides those of the shield; None: none."""
+    if Path(file).is_relative_to(ROOT / "experiments"):
+        return ROOT / "experiments"
+    return None if Path(file).is_relative_to(ROOT) else Path(file).parent  # somebody's barrier
+
+
 @cache
-def _stamp(file: str) -> str:
-    """Digest of all that machine code may hang on: the sources, those beside a function, numba, the machine."""
-    root, digest = Path(__file__).parent.parent, hashlib.sha256(f"{numba.__version__} {sys.version}".encode())
-    paths = {path for name in ("shield", "env", "policies") for path in (root / name).rglob("*.py")}
-    paths = {path for path in paths if not path.relative_to(root).as_posix().startswith(COMPILE_NOTHING)}
-    if Path(file).is_relative_to(root / "experiments"):
-        paths |= set((root / "experiments").rglob("*.py"))
-    elif not Path(file).is_relative_to(root):  # somebody's barrier
-        paths |= set(Path(file).parent.rglob("*.py"))
-    for path in sorted(paths):
-        name = path.relative_to(root) if path.is_relative_to(root) else path
-        digest.update(str(name).encode() + path.read_bytes())
+def _stamp(beside: Path | None) -> str:
+    """Digest of all that machine code may hang on, as it is at import: sources, those beside, numba, the machine."""
+    digest = hashlib.sha256(f"{numba.__version__} {sys.version}".encode())
+    paths = {path for name in ("shield", "env", "policies") for path in (ROOT / name).rglob("*.py")}
+    paths = {path for path in paths if not path.relative_to(ROOT).as_posix().startswith(COMPILE_NOTHING)}
+    for path in sorted(paths | set(beside.rglob("*.py") if beside else ())):
+        name = path.relative_to(ROOT) if path.is_relative_to(ROOT) else path
+        try:
+            digest.update(str(name).encode() + path.read_bytes())
+        except OSError:  # nobody knows whether it changes: nothing kept is found again
+            digest.update(os.urandom(16))
     return digest.hexdigest()
 
 
@@ -107,10 +116,10 @@ class _Kept(NullCache):
     """Machine code on disk, a sealed file each; never a reason to stop."""
 
     def __init__(self, name: str, file: str) -> None:
-        self._name, self._file = name, file
+        self._name, self._stamp = name, _stamp(_beside(file))
 
     def _path(self, args: Any, context: Any) -> Path | None:
-        about = repr((self._name, args, context.codegen().magic_tuple(), _stamp(self._file)))
+        about = repr((self._name, args, context.codegen().magic_tuple(), self._stamp))
         place = kept_in()
         return None if place is None else place / f"{self._name}.{hashlib.sha256(about.encode()).hexdigest()[:32]}.code"
 

@@ -79,10 +79,7 @@ def _same_from_here(i: int, other: Array, scene: Scene) -> bool:
 
 @lean_kernel
 def _has_backup(i: int, scene: Scene) -> bool:
-    """Whether boat i satisfies everything on the backup it holds from its predicted state, or on one found now.
-
-    One search a boat is for all its candidates: what it finds is held from then on.
-    """
+    """Whether boat i satisfies everything on the backup it holds from its predicted state, or on one found now."""
     trial, held = scene.state.shape[0], scene.held
     togo_deg = found_turn(i, scene.next_state[i, L.HEADING], held)
     lay_path(i, trial, held[i, 0], togo_deg, held[i, 2], 1, scene)

@@ -15,6 +15,7 @@ from . import workspace as W
 from .autopilots import Autopilots, all_known, to_turn, unknown_memory
 from .backup.paths import SAG_M
 from .barriers.registered import KeptBarriers
+from .barriers.static import STATIC
 from .commands import Commands
 from .config import ShieldConfig
 from .decide import Deciders
@@ -22,7 +23,7 @@ from .decision import Decisions
 from .exceptions import ConfigError, FleetError
 from .filter.program import Solver, solver_of
 from .fleet import Fleet
-from .jit import Array, BoolArray, IntArray
+from .jit import Array, BoolArray, IntArray, copy_row, kernel
 from .masks import passing
 from .model import boats_of, missing_tables
 from .platforms import layout as L
@@ -80,6 +81,10 @@ class Shield:
         self._deciders: Deciders | None = None
         self._known: tuple[Any, ...] | None = None
         self._missing: BoolArray | None = None
+        self._highest_mps, self._bound = (
+            np.zeros(0),
+            np.zeros(0, np.int64),
+        )  # of boats, and of what binds, in their order
         self._autopilots: Autopilots | None = None
         self.serves: object | None = None
 
@@ -177,10 +182,10 @@ class Shield:
         deciders = self._deciders_of(fleet, static)
         order, place = order_of(fleet.names)
         params, pending = deciders.scene.boats.params, deciders.scene.pending
-        within, cut = nominal.within(fleet.names, fleet.controlled, params[place, L.MAX_SPEED])
+        within, cut = nominal.within(fleet.names, fleet.controlled, self._highest_mps)
         state, unknown = self._with_memory(fleet, order)
         works = pending[0, 0].copy() if pending.size > 0 else None
-        self._give(deciders.scene.given, fleet, state[place], within, order)
+        self._give(deciders.scene.given, fleet, fleet.state if unknown is None else state[place], within, order)
         self._barriers.renew()
         deciders.decide(self._keep_from(static, deciders.scene))
         self._barriers.tell()
@@ -194,8 +199,7 @@ class Shield:
             sent_now = commands.as_relative_deg(fleet.state[:, L.HEADING])[order]
             works = sent_now if works is None else to_turn(works, state)
             self._autopilots.go_on(unknown, params, works, self.config.dt_s)
-        active = told[:, W.ACTIVE].astype(np.int64)
-        return Decisions(
+        return Decisions.made(
             fleet=fleet,
             nominal=nominal,
             filtered=commands,
@@ -203,7 +207,7 @@ class Shield:
             reason=reason,
             safety_margin_m=told[:, W.MARGIN_M],
             slack_m=told[:, W.SLACK_M],
-            bound=np.where(active >= 0, order[np.maximum(active, 0)], active),
+            bound=self._bound[told[:, W.ACTIVE].astype(np.int64)],
             solve_time_s=time.perf_counter() - started,
             no_table=self._missing,
             cut_short=told[:, W.CUT_SHORT] != 0.0,
@@ -253,9 +257,9 @@ class Shield:
             candidates[:, k] = within.as_relative_deg(fleet.state[:, L.HEADING])
             whole[:, k] = True if cut is None else ~cut
         believed = deepcopy(self._autopilots)
-        state, _ = self._with_memory(fleet, order)
+        state, unknown = self._with_memory(fleet, order)
         self._autopilots = believed  # what is asked here is not sent: nothing goes on from it
-        self._give(deciders.scene.given, fleet, state[place], actions[0], order)
+        self._give(deciders.scene.given, fleet, fleet.state if unknown is None else state[place], actions[0], order)
         self._barriers.renew()
         each = np.repeat(candidates[order][np.newaxis], len(deciders.scene.given), axis=0)
         found = passing(deciders, self._keep_from(static, deciders.scene), each)
@@ -284,6 +288,10 @@ class Shield:
                 self._autopilots = Autopilots.of(len(fleet))
                 self._autopilots.carry_over(believed, stayed, then)
         self._deciders, self._known = new, (known, keys)
+        self._highest_mps = boats.params[place, L.MAX_SPEED]
+        self._bound = np.concatenate(
+            [order, np.arange(STATIC - len(self.config.barriers), 0)]
+        )  # read from its end, too
         return new
 
     def _solver(self) -> Solver | None:
@@ -291,16 +299,16 @@ class Shield:
         return solver_of(self.config.solver)
 
     def _with_memory(self, fleet: Fleet, order: IntArray) -> tuple[Array, BoolArray | None]:
-        """States in order with what is believed of autopilots, and (n,) own boats of which nobody tells it, if any."""
+        """States in order with what is believed of autopilots, and of whom; else as they are seen, and None."""
+        if self._autopilots is None and all_known(fleet.state):
+            return fleet.state, None
         state = fleet.state[order]
-        if self._autopilots is None and all_known(state):
-            return state, None
         unknown: BoolArray = fleet.controlled[order] & unknown_memory(state)
         if fleet.age_s is not None:  # what was sent since is not in what is seen
             unknown &= fleet.age_s[order] <= 0.5 * self.config.dt_s
         if not unknown.any():
             self._autopilots = None
-            return state, None
+            return fleet.state, None
         if self._autopilots is None:
             self._autopilots = Autopilots.of(len(fleet))
         self._autopilots.fill(state, unknown, self.config.dt_s, self.config.position_error_m)
@@ -311,17 +319,24 @@ class Shield:
 
         A boat that decides for itself knows its own nominal command and takes teammates to hold their course.
         """
-        rows = np.empty((len(fleet), W.N_GIVEN))
-        write_seen(rows, state, fleet.controlled, fleet.visiting, fleet.driven)
-        rows[:, NOMINAL] = within.as_relative_deg(fleet.state[:, L.HEADING])
-        rows[:, W.AGE_S] = 0.0 if fleet.age_s is None else fleet.age_s
-        rows[:, W.ERROR_M] = 0.0 if fleet.position_error_m is None else fleet.position_error_m
-        rows[:, W.HORIZON_S] = np.nan if fleet.adversary_horizon_s is None else fleet.adversary_horizon_s
-        given[:] = rows[order]
+        if not len(fleet):
+            return
+        nominal = within.as_relative_deg(fleet.state[:, L.HEADING])
+        _write_fresh(given[0], state, fleet.controlled, nominal, order)
+        for column, told in (
+            (W.VISITING, fleet.visiting),
+            (W.AGE_S, fleet.age_s),
+            (W.ERROR_M, fleet.position_error_m),
+            (W.HORIZON_S, fleet.adversary_horizon_s),
+            (slice(W.DRIVEN, W.N_GIVEN), fleet.driven),
+        ):
+            if told is not None:
+                given[0, :, column] = told[order]
         if self.config.coordination == "per_boat":
+            given[1:] = given[0]
             given[~fleet.controlled[order], :, W.OURS] = 0.0  # these decide nothing
             given[:, :, W.NOMINAL_SPEED], given[:, :, W.NOMINAL_TURN] = given[:, :, L.SPEED], 0.0
-            given[(*self._own_rows(len(fleet)), NOMINAL)] = rows[order, NOMINAL]
+            given[(*self._own_rows(len(fleet)), NOMINAL)] = nominal[order]
 
     def _own_rows(self, boats: int) -> tuple[Any, ...]:
         """Where the decision that counts for each boat is: in the only one, or in its own."""
@@ -353,21 +368,21 @@ class Shield:
         return self._packed[1]
 
 
-def write_seen(
-    given: Array, state: Array, ours: BoolArray, visiting: BoolArray | None = None, driven: Array | None = None
-) -> None:
-    """Write boats, (..., n) of them, into what is given to deciders; None: nothing is known."""
-    given[..., : L.N_STATE], given[..., W.OURS] = state, ours
-    given[..., W.VISITING] = 0.0 if visiting is None else visiting
-    given[..., W.DRIVEN :] = np.nan if driven is None else driven
+@kernel
+def _write_fresh(given: Array, state: Array, ours: BoolArray, nominal: Array, order: IntArray) -> None:
+    """Write boats in that order into what is given, (n, N_GIVEN): tracks fresh and exact, and no more known of them."""
+    for k in range(order.shape[0]):
+        i = order[k]
+        given[k, :] = 0.0
+        copy_row(given[k], state[i])
+        given[k, W.OURS] = 1.0 if ours[i] else 0.0
+        given[k, W.NOMINAL_SPEED], given[k, W.NOMINAL_TURN] = nominal[i, 0], nominal[i, 1]
+        given[k, W.HORIZON_S] = np.nan
+        given[k, W.DRIVEN :] = np.nan
 
 
 def _check(fleet: Fleet, wanted: Commands, config: ShieldConfig) -> None:
-    """Check what is to be decided about.
-
-    Raises:
-        FleetError: it is of another kind, or has values or shapes that cannot be used.
-    """
+    """Raise a FleetError for what is of another kind, or has values or shapes that cannot be used."""
     if not isinstance(fleet, Fleet) or not isinstance(wanted, Commands):
         raise FleetError(
             f"decide takes a Fleet and Commands, not {type(fleet).__name__} and {type(wanted).__name__}; build "

@@ -5,22 +5,12 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from .. import workspace as W
 from ..backup.paths import READY_SAMPLE
 from ..jit import Array, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..tables.lookup import WHOLE_S
-from ..workspace import (
-    RUN_EAST,
-    RUN_NORTH,
-    RUN_SPEED,
-    RUN_TO_X,
-    RUN_TO_Y,
-    RUN_WEIGHT,
-    RUN_WORST,
-    RUN_X,
-    RUN_Y,
-    Scene,
-)
+from ..workspace import Scene
 from .clearance import FAR, MARGIN, nearest_on
 from .neighbours import may_pursue
 from .value_function import adversarial_for, beyond_table, margin_when_ready, table_answers, tabled, worst_at_once
@@ -41,8 +31,6 @@ LONGEST_STRIDE = 6
 """Samples a pursuer far away is moved on at once: ``scene.turns`` has a row for each number of them."""
 CHASE_STRIDE = 4
 """Samples a pursuer that is near is moved on at once when it follows a boat that has long run straight."""
-
-
 ROUNDING_M = 1e-6
 """A pursuer that is past is so by more than this, m."""
 
@@ -199,8 +187,8 @@ def _note_turns(j: int, rudder: int, scene: Scene) -> None:
 def _begin_run(j: int, run: Array, own: Array, scene: Scene) -> None:
     """Put a run of opponent j where it is one step on."""
     copy_row(run, scene.course[j])
-    run[RUN_SPEED], run[RUN_WORST], run[RUN_WEIGHT] = scene.state[j, L.SPEED], scene.tuning.margin_cap_m, 1.0
-    run[RUN_TO_X], run[RUN_TO_Y] = own[0, 0] - run[RUN_X], own[0, 1] - run[RUN_Y]
+    run[W.RUN_SPEED], run[W.RUN_WORST], run[W.RUN_WEIGHT] = scene.state[j, L.SPEED], scene.tuning.margin_cap_m, 1.0
+    run[W.RUN_TO_X], run[W.RUN_TO_Y] = own[0, 0] - run[W.RUN_X], own[0, 1] - run[W.RUN_Y]
 
 
 @lean_kernel
@@ -215,8 +203,8 @@ def _is_past(k: int, x: float, y: float, worst: float, own: Array, radius_m: flo
 def _move_on(k: int, lead: int, i: int, j: int, slot: int, loss: float, pursuit: Pursuit, scene: Scene) -> int:
     """Move a run of opponent j on from sample k; returns the sample it then is at, the last where it is past."""
     run, own, sample_s = scene.runs[lead], scene.path[slot], scene.boats.sample_s
-    x, y, ux, uy, speed_mps = run[RUN_X], run[RUN_Y], run[RUN_EAST], run[RUN_NORTH], run[RUN_SPEED]
-    x0, y0, worst, weight = run[RUN_TO_X], run[RUN_TO_Y], run[RUN_WORST], run[RUN_WEIGHT]
+    x, y, ux, uy, speed_mps = run[W.RUN_X], run[W.RUN_Y], run[W.RUN_EAST], run[W.RUN_NORTH], run[W.RUN_SPEED]
+    x0, y0, worst, weight = run[W.RUN_TO_X], run[W.RUN_TO_Y], run[W.RUN_WORST], run[W.RUN_WEIGHT]
     radius_m, closing_m = scene.radius[i, j], closing(i, j, scene)
     root, free, square = radius_m + scene.tuning.margin_cap_m, 0, x0 * x0 + y0 * y0
     worth = (root + 2.0 * closing_m) * (root + 2.0 * closing_m)
@@ -239,9 +227,9 @@ def _move_on(k: int, lead: int, i: int, j: int, slot: int, loss: float, pursuit:
     x1, y1 = own[k, 0] - x, own[k, 1] - y
     for _ in range(stride):
         weight *= pursuit.fade
-    run[RUN_X], run[RUN_Y], run[RUN_EAST], run[RUN_NORTH], run[RUN_SPEED] = x, y, ux, uy, new_speed
-    run[RUN_TO_X], run[RUN_TO_Y], run[RUN_WEIGHT] = x1, y1, weight
-    run[RUN_WORST] = _faded(worst, weight, radius_m, x0, y0, x1, y1)
+    run[W.RUN_X], run[W.RUN_Y], run[W.RUN_EAST], run[W.RUN_NORTH], run[W.RUN_SPEED] = x, y, ux, uy, new_speed
+    run[W.RUN_TO_X], run[W.RUN_TO_Y], run[W.RUN_WEIGHT] = x1, y1, weight
+    run[W.RUN_WORST] = _faded(worst, weight, radius_m, x0, y0, x1, y1)
     return k
 
 
@@ -264,14 +252,14 @@ def _run_pursuers(i: int, j: int, slot: int, rudder: int, pursuit: Pursuit, floo
             k = _move_on(k, 0, i, j, slot, loss, pursuit, scene)
         if ahead < last:
             ahead = _move_on(ahead, 1, i, j, slot, loss, pursuit, scene)
-        if min(runs[0, RUN_WORST], runs[1, RUN_WORST]) < floor_m:
+        if min(runs[0, W.RUN_WORST], runs[1, W.RUN_WORST]) < floor_m:
             break
-    worst_m = min(runs[0, RUN_WORST], runs[1, RUN_WORST])
+    worst_m = min(runs[0, W.RUN_WORST], runs[1, W.RUN_WORST])
     if not pursuit.to_table or worst_m < floor_m:
         return worst_m
     for lead in range(2):
         value_m = margin_when_ready(i, j, slot, runs[lead], scene)
-        worst_m = min(worst_m, value_m * runs[lead, RUN_WEIGHT] if value_m < 0.0 else value_m)
+        worst_m = min(worst_m, value_m * runs[lead, W.RUN_WEIGHT] if value_m < 0.0 else value_m)
     return worst_m
 
 

@@ -105,6 +105,8 @@ class KeptBarriers:
 
     def tell(self) -> None:
         """Log, once for each, which barriers gave no usable margin in the last decision."""
+        if not self.names:
+            return
         for name, faults in zip(self.names, self.arrays.faults, strict=True):
             if faults:
                 say_once(

@@ -145,10 +145,7 @@ def _join_short(scene: Scene) -> int:
 
 @lean_kernel
 def _assign_backups(count: int, scene: Scene) -> bool:
-    """Backups of the movers from the present state; whether all boats of ours then keep clear.
-
-    Opponents are left where boats with tables look them up on such manoeuvres.
-    """
+    """Backups of the movers from the present state; whether all boats of ours then keep clear."""
     ours, boats = scene.ours, scene.boats
     table_steps = 1
     for i in range(ours.shape[0]):

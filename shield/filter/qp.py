@@ -280,10 +280,7 @@ def begin_program(scene: Scene) -> int:
 
 @lean_kernel
 def _take_answer(z: Array, count: int, scene: Scene) -> bool:
-    """Turn scaled inputs into the commands whose autopilot yields them; False when any of them is not finite.
-
-    A boat whose inputs are unchanged keeps its nominal command, bit for bit.
-    """
+    """Turn scaled inputs, but unchanged ones, into commands that yield them; False when any of them is not finite."""
     root, dt_s = math.sqrt(scene.tuning.speed_weight), scene.tuning.dt_s
     for m in range(2 * count):
         if not math.isfinite(z[m]):

@@ -30,6 +30,7 @@ import logging, sys
 logging.basicConfig(format="%(message)s")
 sys.path.insert(0, {folder!r})
 from {module} import outer
+{meanwhile}
 print(outer({x}, 3))
 """
 
@@ -38,9 +39,9 @@ print(outer({x}, 3))
 def call(tmp_path):
     """Call a kernel of a module in a process of its own; what it prints and logs."""
 
-    def called(inner="2.0 * x", x=1.5, kept=tmp_path / "kept", number=0):
+    def called(inner="2.0 * x", x=1.5, kept=tmp_path / "kept", number=0, meanwhile=""):
         (tmp_path / f"kernels{number}.py").write_text(KERNEL.format(inner=inner))
-        run = RUN.format(folder=str(tmp_path), module=f"kernels{number}", x=x)
+        run = RUN.format(folder=str(tmp_path), module=f"kernels{number}", x=x, meanwhile=meanwhile)
         environment = os.environ | {"NUMBA_CACHE_DIR": str(kept), "XDG_CACHE_HOME": str(tmp_path / "home")}
         done = subprocess.run([sys.executable, "-c", run], env=environment, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
@@ -58,6 +59,12 @@ def test_a_new_process_reads_what_another_kept_and_does_as_it_did(call):
 
 def test_what_a_changed_callee_does_is_seen(call):
     call()
+    assert call(inner="5.0 * x")[0] == 30.0
+
+
+def test_what_changes_while_a_process_runs_is_not_taken_for_what_that_compiles(call, tmp_path):
+    changed = KERNEL.format(inner="5.0 * x")
+    assert call(meanwhile=f"open({str(tmp_path / 'kernels0.py')!r}, 'w').write({changed!r})")[0] == 12.0
     assert call(inner="5.0 * x")[0] == 30.0
 
 
