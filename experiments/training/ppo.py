@@ -317,7 +317,7 @@ def read_checkpoint(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
 
 
 def _ppo(config: Config, env: TrainEnv) -> PPO:
-    """SB3's PPO of a config; the actor learns nothing while the critic learns alone."""
+    """SB3's PPO of a config."""
     ppo, net, batch = config.ppo, config.net, env.batch
     looks = {
         "features": features_of(batch.core, net.features),
@@ -349,12 +349,16 @@ def _ppo(config: Config, env: TrainEnv) -> PPO:
         seed=config.seed,
     )
     model.set_logger(Logger(None, []))
+    _hold_actor_back(model, ppo.critic_first * ppo.epochs)
+    return model
+
+
+def _hold_actor_back(model: PPO, updates: int) -> None:
+    """Let the actor learn nothing in the first updates: the critic learns alone."""
 
     def held_back(gradient: torch.Tensor) -> torch.Tensor:
-        alone = model._n_updates < ppo.critic_first * ppo.epochs
-        return torch.zeros_like(gradient) if alone else gradient
+        return torch.zeros_like(gradient) if model._n_updates < updates else gradient
 
     for name, parameter in model.policy.named_parameters():
         if "policy" in name or name.startswith(("action_net", "log_std")):
             parameter.register_hook(held_back)
-    return model
