@@ -89,7 +89,7 @@ class BenchSettings:
     def small(self) -> BenchSettings:
         """Return a version of seconds instead of minutes; its figures are rough."""
         fewer = replace(self, repeats=1, game_s=20.0, lookups=20_000, programs=30, scenes=10, counts=self.counts[:2])
-        return replace(fewer, batch=BatchSize(game_steps=1280, repeats=2), games=64, games_at_once=(64, 128))
+        return replace(fewer, batch=BatchSize(game_steps=640, repeats=2), games=32, games_at_once=(32, 64))
 
     def batch_runs(self) -> list[BatchRun]:
         """Policies with a shield and without, numbers of games, and threads, each once."""
