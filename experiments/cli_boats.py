@@ -294,7 +294,6 @@ def referee(
     publish: Annotated[
         list[str] | None, o.option("HOST:PORT", "Tell also this listener; may be repeated.", "--publish")
     ] = None,
-    links: Annotated[bool, o.flag("Hear boats that have a link there too; nothing is commanded.", "--links")] = False,
     rate: Annotated[float, o.option("HZ", "Looks a second.")] = RATE_HZ,
     speed: Annotated[float, o.option("X", "Times faster than real time, as sim-boats was started.")] = 1.0,
     minutes: Annotated[float | None, o.option("MIN", "Longest time.", default="until the end")] = None,
@@ -314,7 +313,7 @@ def referee(
         raise ConfigError(f"--minutes is {minutes:g}; give a time > 0")
     file, started = load_fleet(fleet), time.perf_counter()
     events: list[dict[str, Any]] = []
-    with Referee(file, MonotonicClock(speed), listen, publish or (), links) as kept, _ended() as stopped:
+    with Referee(file, MonotonicClock(speed), listen, publish or ()) as kept, _ended() as stopped:
         with err().status("waiting for boats") as status:
 
             def tell(state: GameState, happened: Sequence[str]) -> None:
@@ -325,10 +324,10 @@ def referee(
 
             why = kept.run(tell, stopped, rate, None if minutes is None else 60.0 * minutes)
         state = kept.umpire.state()
-        faults = {} if kept.hearing.feed is None else kept.hearing.feed.faults()
+        faults = kept.feed.faults()
     out().print(_game_table(state))
     if json_file is not None:
-        settings = {"listen": listen, "publish": publish or [], "links": links, "rate": rate, "speed": speed}
+        settings = {"listen": listen, "publish": publish or [], "rate": rate, "speed": speed}
         content = {**head_of("referee", settings, started), "ended": why, "faults": faults}
         write_json(json_file, {**content, "game": state.as_dict(), "events": events})
     if why == "stopped":

@@ -12,7 +12,7 @@ import typer
 from rich.table import Table
 from rich.text import Text
 from steerclear.env.record import save
-from steerclear.shield.bridge.blackbox import LogReader, mend
+from steerclear.shield.bridge.blackbox import LogReader
 from steerclear.shield.bridge.fleet_file import FleetFile, load_fleet
 from steerclear.shield.bridge.mavlink.signing import read_key
 from steerclear.shield.exceptions import BridgeError, ConfigError
@@ -24,7 +24,7 @@ from .cli_boats import WithParent
 from .cli_files import check_each_once, check_ending
 from .console import ExitCode, Interrupted, command, err, finish, out, say, warn
 from .deploy.demo import end_with_parent
-from .deploy.replay import as_content, compare, draw, replay_log, show
+from .deploy.replay import as_content, judge, replay_log, show
 from .fit.fitting import best_of, fit_runs, platform_file, results_of
 from .fit.models import MODELS
 from .fit.reading import read_logs
@@ -223,15 +223,10 @@ def _show_boats(content: dict[str, Any], files: list[str]) -> None:
 @command()
 def replay(
     log: Annotated[Path, typer.Argument(help="Black-box log (.mcap) that deploy wrote.")],
-    without_shield: Annotated[
-        bool, o.flag("Also show what would have happened without the shield.", "--without-shield")
+    judge_breaches: Annotated[
+        bool, o.flag("Also tell how close boats came, and judge which breaches were avoidable.", "--judge")
     ] = False,
-    judge: Annotated[bool, o.flag("Judge which hits were avoidable (with --without-shield).")] = True,
     html: Annotated[Path | None, o.flag("Write a replay to scrub in a browser; a new file."), NEW] = None,
-    record: Annotated[Path | None, o.flag("Write the game's record (.npz) for render.", "--record"), NEW] = None,
-    mended: Annotated[
-        Path | None, o.flag("Write what can be read of a cut-off log as a whole one (.mcap).", "--mend"), NEW
-    ] = None,
     key: Annotated[Path | None, o.flag("Key file of the boats: check the codes of a log written with signing.")] = None,
     json_file: o.JsonFile = None,
 ) -> None:
@@ -242,25 +237,17 @@ def replay(
     """
     started = time.perf_counter()
     check_ending(html, "--html", ".html", ".htm")
-    check_ending(record, "--record", ".npz")
-    check_ending(mended, "--mend", ".mcap")
     with LogReader(log, None if key is None else read_key(key)) as reader:
-        found = replay_log(reader, keep_tracks=without_shield or html is not None or record is not None)
-    draw(found)
-    if without_shield:
-        compare(found, judge)
+        found = replay_log(reader, keep_tracks=judge_breaches or html is not None)
+    if judge_breaches:
+        judge(found)
     files = []
-    if mended is not None:
-        mend(log, mended)
-        files.append(str(mended))
-    if html is not None:
-        files.append(str(write_replay(found.records, html, f"steerclear replay of {log.name}")))
-    if record is not None:
-        files.append(str(save(found.records[0], record)))
+    if html is not None and found.record is not None:
+        files.append(str(write_replay(found.record, html, f"steerclear replay of {log.name}")))
     show(out(), found)
     say(*files)
     if json_file is not None:
-        settings = {"log": str(log), "without_shield": without_shield, "judge": judge}
+        settings = {"log": str(log), "judge": judge_breaches}
         head = head_of("replay", settings, started)
         write_json(json_file, {**head, "log": str(log), **as_content(found), "files": files})
     finish(found.proof.holds)
@@ -272,7 +259,7 @@ def replay(
 def fit(
     logs: Annotated[
         list[Path],
-        typer.Argument(metavar="LOG...", help="Logs of one boat: .csv of steps, .tlog, ArduPilot .bin, .mcap, .alog."),
+        typer.Argument(metavar="LOG...", help="Logs of one boat: black boxes (.mcap) and .csv of steps."),
     ],
     file: Annotated[Path, o.option("FILE", "Platform file to write (.yaml); a new one.", "--out"), NEW] = Path(
         "boat.yaml"
@@ -280,7 +267,6 @@ def fit(
     name: Annotated[str | None, o.option("NAME", "Of the boat.", default="the file's name")] = None,
     kind: Annotated[str, o.option("KIND", "rate, usv, or auto: the one that predicts best.")] = "auto",
     boat: Annotated[str | None, o.option("NAME", "The boat, of a black-box log with several.")] = None,
-    system_id: Annotated[int | None, o.option("N", "The boat, of a .tlog with several.")] = None,
     plot: Annotated[
         Path | None, o.option("FILE", "Picture of the fit, a new file.", default="beside --out, .png"), NEW
     ] = None,
@@ -298,7 +284,7 @@ def fit(
     if kind != "auto" and kind not in MODELS:
         raise ConfigError(f"--kind is {kind!r}; give auto or one of {', '.join(MODELS)}")
     left_out: list[str] = []
-    runs = read_logs(logs, boat, system_id, left_out.append)
+    runs = read_logs(logs, boat, left_out.append)
     for words in left_out:
         err().print(f"left out: {words}", style="yellow", soft_wrap=True)
     kinds = tuple(MODELS) if kind == "auto" else (kind,)

@@ -1,4 +1,4 @@
-"""What a replay found: the proof, distances, breaches and verdicts with and without the shield; as numbers and text."""
+"""What a replay found: the proof, and on demand distances, breaches and verdicts; as numbers and text."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from steerclear.shield.bridge.blackbox import ChainCheck, LogHeader, LogLine, Lo
 from steerclear.shield.bridge.blackbox.header import describe_machine, source_digest, table_digests, versions
 
 from ..game_metrics import PairDistances
-from ..verdicts import NOT_JUDGED, judge_game
+from ..verdicts import judge_game
 from .proof import Difference, Proof, Prover
-from .tracks import TrackBuilder, Tracks, Without, placed, record_of, sail_without
+from .tracks import TrackBuilder, Tracks, placed, record_of
 
 MOST_LINES = 200
 """Lines of the log kept for the report."""
@@ -33,9 +33,9 @@ class Replay:
 
     Attributes:
         lines: warnings and errors in the log.
-        tracks, without: what happened and what would have happened; None where not asked for.
-        records: of both.
-        sides: by "with" and "without": closest distances, m, numbers of breaches and the breaches with verdicts.
+        tracks: what happened; None where not asked for.
+        record: of the game, made of the tracks.
+        judged: closest distances, m, numbers of breaches and the breaches with verdicts; empty where not asked for.
     """
 
     header: LogHeader
@@ -50,9 +50,8 @@ class Replay:
     lines: list[LogLine]
     origin: list[str]
     tracks: Tracks | None = None
-    without: Without | None = None
-    records: list[Record] = field(default_factory=list)
-    sides: dict[str, dict[str, Any]] = field(default_factory=dict)
+    record: Record | None = None
+    judged: dict[str, Any] = field(default_factory=dict)
 
     @property
     def proved(self) -> bool:
@@ -87,10 +86,11 @@ def replay_log(log: LogReader, keep_tracks: bool) -> Replay:
         reasons.update(d.reason.name for d in entry.decisions or () if d.reason.name != "NOT_COVERED")
         if keep_tracks:
             builder.add(entry)
+    tracks = builder.finish() if keep_tracks else None
     return Replay(
         header=log.header,
         proof=prover.proof,
-        complete=log.complete and not log.chain.is_mended,
+        complete=log.complete,
         chain=log.chain,
         damage=log.damage,
         began=time.strftime("%Y-%m-%d %H:%M:%S UTC", time.gmtime(log.header.unix_ns / 1e9)),
@@ -99,7 +99,8 @@ def replay_log(log: LogReader, keep_tracks: bool) -> Replay:
         actions=actions,
         lines=lines,
         origin=origin_of(log.header),
-        tracks=builder.finish() if keep_tracks else None,
+        tracks=tracks,
+        record=None if tracks is None else record_of(log.header, tracks),
     )
 
 
@@ -120,54 +121,22 @@ def origin_of(header: LogHeader) -> list[str]:
     return found
 
 
-def draw(replay: Replay) -> None:
-    """Fill in the record of what happened, distances and breaches."""
-    if replay.tracks is not None:
-        _add_side(replay, replay.tracks, "with", "as it was", replay.tracks.states)
-
-
-def compare(replay: Replay, judge: bool) -> None:
-    """Fill in what would have happened without the shield, and what the oracle says of breaches that happened."""
-    tracks = replay.tracks
-    if tracks is None:
+def judge(replay: Replay) -> None:
+    """Fill in how close own boats came to others, and what the oracle says of their breaches."""
+    tracks, record = replay.tracks, replay.record
+    if tracks is None or record is None:
         return
-    replay.without = sail_without(tracks, replay.header.config.delay_s)
-    _add_side(replay, tracks, "without", "without the shield", replay.without.states)
-    if judge:
-        side = min(int(tracks.team[tracks.ours].min(initial=1)), 1)
-        seen: Any = SimpleNamespace(states=placed(tracks.states), driven=tracks.marked("driven"))
-        replay.sides["with"]["breaches"] = judge_game(seen, tracks.params, replay.records[0], side)
-
-
-def _add_side(replay: Replay, tracks: Tracks, side: str, title: str, states: Any) -> None:
-    """Closest distances, m, None without such a pair, and breaches of own boats nobody judged yet, see `keys`."""
-    record = record_of(replay.header, tracks, states, title, shielded=side == "with")
-    replay.records.append(record)
-    distances = PairDistances.of(placed(states)[:, :, :2])
-    found: dict[str, Any] = {"breaches": []}
-    for row in record["breaches"]:
-        pair = [int(row[1]), int(row[2])]
-        if tracks.ours[pair].any():
-            found["breaches"].append(
-                {
-                    "step": int(row[0]),
-                    "time_s": int(row[0]) * tracks.dt_s,
-                    "boats": [tracks.names[boat] for boat in pair],
-                    "kind": "teammate" if tracks.ours[pair].all() else "opponent",
-                    "radius_m": replay.header.config.separation_m,
-                    "closest_m": float(row[3]),
-                    "verdict": NOT_JUDGED,
-                    **dict.fromkeys(("last_preventable_s", "other_last_preventable_s", "exhausted", "responsible")),
-                    "responsible_boats": [],
-                }
-            )
+    side = min(int(tracks.team[tracks.ours].min(initial=1)), 1)
+    seen: Any = SimpleNamespace(states=placed(tracks.states), driven=tracks.marked("driven"))
+    breaches = judge_game(seen, tracks.params, record, side)
+    distances = PairDistances.of(placed(tracks.states)[:, :, :2])
     for kind, wanted in (("teammate", 2), ("opponent", 1)):
         columns = [c for c, pair in enumerate(distances.pairs) if tracks.ours[list(pair)].sum() == wanted]
         gaps = distances.distance_m[:, columns]
         near = gaps[gaps < 1e5]
-        found[f"closest_{kind}_m"] = float(near.min()) if near.size else None
-        found[f"breaches_{kind}"] = sum(breach["kind"] == kind for breach in found["breaches"])
-    replay.sides[side] = found
+        replay.judged[f"closest_{kind}_m"] = float(near.min()) if near.size else None
+        replay.judged[f"breaches_{kind}"] = sum(breach["kind"] == kind for breach in breaches)
+    replay.judged["breaches"] = breaches
 
 
 def as_content(replay: Replay) -> dict[str, Any]:
@@ -181,7 +150,6 @@ def as_content(replay: Replay) -> dict[str, Any]:
         "origin": replay.origin,
         "chain": {
             **{name: getattr(chain, name) for name in ("chained", "keyed", "codes_checked", "broken", "breaks")},
-            "mended": chain.is_mended,
         },
         **counts,
         "missing": [list(stretch) for stretch in counts["missing"]],
@@ -191,12 +159,12 @@ def as_content(replay: Replay) -> dict[str, Any]:
             {"condition": condition, "response": response, "subject": subject, "ticks": count}
             for (condition, response, subject), count in replay.actions.most_common()
         ],
-        "sides": replay.sides,
+        **replay.judged,
     }
     del content["first"]
     content["first_difference"] = proof.first and proof.first._asdict()
     content["first_sent"] = proof.first_sent and proof.first_sent._asdict()
-    return content if replay.without is None else {**content, "stretches": replay.without.stretches}
+    return content
 
 
 def show(console: Console, replay: Replay) -> None:
@@ -219,9 +187,7 @@ def _log_lines(replay: Replay) -> Iterator[RenderableType]:
             f"Made by {replay.made_by}. Not all is as here, and this program may decide otherwise:", style="yellow"
         )
         yield from (Text(f"  {text}") for text in replay.origin)
-    if replay.chain.is_mended:
-        yield "The log was cut off (crash, power or kill) and mended; what followed is missing."
-    elif not replay.complete:
+    if not replay.complete:
         yield "The log was not closed (crash, power or kill); read up to what was on the disk."
     yield from (Text(f"Damage: {text}.", style="red") for text in replay.damage)
     yield from (Text(f"  {line.name}: {line.text}") for line in replay.lines[:MOST_ROWS])
@@ -288,34 +254,26 @@ def _tables(replay: Replay) -> Iterator[RenderableType]:
             table.add_row(condition, response, subject, str(count))
         yield table
         yield from _rest(len(replay.actions))
-    if replay.without is None:
+    if not replay.judged:
         return
-    table = Table("", "with the shield", "without", title="Own boats", title_justify="left")
+    table = Table("", "", title="Own boats", title_justify="left", show_header=False)
     for key, name in (
         ("closest_teammate_m", "closest teammate, m"),
         ("closest_opponent_m", "closest other boat, m"),
         ("breaches_teammate", "breaches with teammates"),
         ("breaches_opponent", "breaches with others"),
     ):
-        table.add_row(name, *(_number(replay.sides[side][key]) for side in ("with", "without")))
+        table.add_row(name, _number(replay.judged[key]))
     yield table
-    left = f"Boats left their track {replay.without.stretches} times to do what was wanted; others stay on theirs."
-    yield f"Radius {replay.header.config.separation_m:g} m. {left}"
-    for side, title in (("with", "Breaches that happened"), ("without", "Breaches without the shield")):
-        if breaches := replay.sides[side]["breaches"]:
-            yield _breaches(title, breaches)
-            yield from _rest(len(breaches))
-
-
-def _breaches(title: str, breaches: list[dict[str, Any]]) -> Table:
-    judged = any(entry["responsible"] for entry in breaches)
-    more = ("verdict", "last chance, s before", "responsible") if judged else ()
-    table = Table("time, s", "boats", "closest, m", *more, title=title, title_justify="left")
-    for entry in breaches[:MOST_ROWS]:
-        row = [f"{entry['time_s']:.1f}", ", ".join(entry["boats"]), f"{entry['closest_m']:.2f}"]
-        verdict = [entry["verdict"], _number(entry["last_preventable_s"]), entry["responsible"] or "-"]
-        table.add_row(*row, *(verdict if judged else ()))
-    return table
+    if breaches := replay.judged["breaches"]:
+        title = f"Breaches of {replay.header.config.separation_m:g} m"
+        heads = ("time, s", "boats", "closest, m", "verdict", "last chance, s before", "responsible")
+        table = Table(*heads, title=title, title_justify="left")
+        for entry in breaches[:MOST_ROWS]:
+            row = [f"{entry['time_s']:.1f}", ", ".join(entry["boats"]), f"{entry['closest_m']:.2f}"]
+            table.add_row(*row, entry["verdict"], _number(entry["last_preventable_s"]), entry["responsible"] or "-")
+        yield table
+        yield from _rest(len(breaches))
 
 
 def _number(value: Any) -> str:

@@ -1,30 +1,28 @@
-"""A log as tracks: every boat's state at even steps of time, as it was and as it would have been without the shield."""
+"""A log as tracks: every boat's state at even steps of time, and the record of a game made of them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from steerclear.env.config import GameConfig
-from steerclear.env.record import NOT_COVERED, Record, find_breaches, make_record
+from steerclear.env.record import Record, find_breaches, make_record
 from steerclear.shield.bridge.blackbox import LogHeader
 from steerclear.shield.bridge.messages import Tick
 from steerclear.shield.bridge.tracker import GHOST
 from steerclear.shield.decision import Reason
 from steerclear.shield.exceptions import ConfigError, LogError
-from steerclear.shield.platforms import get_platform, step_boat
+from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.tracks import fill_memory, whole_steps
+from steerclear.shield.tracks import fill_memory
 
 Array = NDArray[np.float64]
 GONE_S = 1.5
 """A boat that nothing was heard of for longer than this is not there, s."""
-BACK_S, LONGEST_S = 5.0, 20.0
-"""A boat is put back when its command was not changed for so long, and after so long in any case, s."""
 OFF_M = 1e6
 """Where boats are that are not there, m, each as far from the next."""
 MOST_STEPS = 10_000_000
@@ -120,11 +118,11 @@ class TrackBuilder:
         """The tracks, or a `LogError`: there are no two ticks with boats."""
         names = tuple(name for name, fixes in self._fixes.items() if fixes)
         if len(self._times) < 2 or not names:
-            raise LogError("the log holds no two ticks with boats; there is nothing to replay without the shield")
+            raise LogError("the log holds no two ticks with boats; there is nothing to draw or judge")
         dt_s = self._header.config.dt_s
         span = (self._times[-1] - self._times[0]) / dt_s + 0.5
         if not 1.0 <= span < MOST_STEPS:
-            raise LogError(f"the times of the log's ticks span {span:g} steps; there is nothing to replay")
+            raise LogError(f"the times of the log's ticks span {span:g} steps; there is nothing to draw or judge")
         time_s: Array = self._times[0] + dt_s * np.arange(int(span) + 1, dtype=np.float64)
         kinds: list[Any] = [self._kind[name] for name in names]
         platforms = [get_platform(self._header.platforms.get(kind, kind)) for kind in kinds]
@@ -189,51 +187,6 @@ def _wrapped(degrees: Any) -> Any:
     return (degrees + 180.0) % 360.0 - 180.0
 
 
-class Without(NamedTuple):
-    """Tracks without the shield: states (T+1, n, N_STATE), boats off their track (T+1, n), times they left it."""
-
-    states: Array
-    away: NDArray[np.bool_]
-    stretches: int
-
-
-def sail_without(tracks: Tracks, delay_s: float = 0.0) -> Without:
-    """Steer boats whose command was changed by what was wanted; ``delay_s``: from a command to its effect, s."""
-    states = tracks.states.copy()
-    away = np.zeros(states.shape[:2], dtype=np.bool_)
-    late = whole_steps(delay_s, tracks.dt_s)
-    stretches = sum(_sail(tracks, int(i), late, states, away) for i in np.flatnonzero(tracks.ours))
-    return Without(states, away, stretches)
-
-
-def _sail(tracks: Tracks, i: int, late: int, states: Array, away: NDArray[np.bool_]) -> int:
-    """One boat, in place; returns how many times it left its track."""
-    back, longest = round(BACK_S / tracks.dt_s), round(LONGEST_S / tracks.dt_s)
-    begun = quiet = stretches = 0
-    out = False
-    for k in range(late, len(tracks.wanted)):
-        changed = bool(tracks.intervened[k - late, i])
-        quiet = 0 if changed else quiet + 1
-        there = np.isfinite(tracks.states[k : k + 2, i, L.X]).all()
-        if out and (quiet >= back or k - begun >= longest or not there):
-            out = False
-        if not out and changed and there:
-            out, begun, stretches = True, k, stretches + 1
-            states[k, i] = tracks.states[k, i]
-        if out:
-            states[k + 1, i] = states[k, i]
-            row = states[k + 1, i]
-            speed_mps, heading_rad = tracks.wanted[k - late, i].tolist()
-            if not (math.isfinite(speed_mps) and math.isfinite(heading_rad) and abs(speed_mps) < 1e3):
-                speed_mps, heading_rad = 0.0, math.radians(row[L.HEADING])  # nobody could follow it: stop on course
-            row = states[k + 1, i]
-            step_boat(
-                tracks.params[i], row, speed_mps, _wrapped(math.degrees(heading_rad) - row[L.HEADING]), tracks.dt_s
-            )
-            away[k + 1, i] = True
-    return stretches
-
-
 def placed(states: Array) -> Array:
     """States (T+1, n, N_STATE) with boats that are not there put far away from everything and one another."""
     found, gone = states.copy(), ~np.isfinite(states[:, :, L.X])
@@ -243,34 +196,28 @@ def placed(states: Array) -> Array:
     return found
 
 
-def record_of(header: LogHeader, tracks: Tracks, states: Array, title: str, shielded: bool) -> Record:
-    """The record of a game with states (T+1, n, N_STATE), the tracks' own or those without the shield.
-
-    Boats that are not there stay where they were last, or will be first. Without ``shielded`` they were sent what was
-    wanted.
-    """
+def record_of(header: LogHeader, tracks: Tracks) -> Record:
+    """The record of the game; boats that are not there stay where they were last, or will be first."""
     import pandas as pd
 
-    flat = pd.DataFrame(states[..., :_SEEN].reshape(len(states), -1)).ffill().bfill().fillna(0.0)
-    seen = flat.to_numpy().reshape(*states.shape[:2], _SEEN)
-    covered = shielded & (tracks.reason != NOT_COVERED)
-    wanted, sent = (_in_degrees(commands) for commands in (tracks.wanted, tracks.sent if shielded else tracks.wanted))
+    flat = pd.DataFrame(tracks.states[..., :_SEEN].reshape(len(tracks.states), -1)).ffill().bfill().fillna(0.0)
+    seen = flat.to_numpy().reshape(*tracks.states.shape[:2], _SEEN)
     marks = {"has_flag": "has_flag", "is_tagged": "tagged", "oob": "oob"}
     last = [*tracks.games, tracks.games[-1]]
     return make_record(
-        _meta(header, tracks, title, shielded),
+        _meta(header, tracks),
         position=seen[:, :, : L.Y + 1],
         heading_deg=seen[:, :, L.HEADING],
         speed_mps=seen[:, :, L.SPEED],
         **{array: tracks.marked(key)[[*range(len(tracks.games)), -1]] for array, key in marks.items()},
         flag_position=np.array([_flags(game) for game in last], dtype=np.float64),
         captures=np.array([_captures(game) for game in last], dtype=np.int64),
-        wanted=wanted,
-        sent=sent,
-        reason=np.where(covered, tracks.reason, NOT_COVERED),
-        intervened=tracks.intervened & covered,
-        safety_margin_m=np.where(covered, tracks.safety_margin_m, np.nan),
-        breaches=find_breaches(placed(states)[:, :, : L.Y + 1], header.config.separation_m),
+        wanted=_in_degrees(tracks.wanted),
+        sent=_in_degrees(tracks.sent),
+        reason=tracks.reason,
+        intervened=tracks.intervened,
+        safety_margin_m=tracks.safety_margin_m,
+        breaches=find_breaches(placed(tracks.states)[:, :, : L.Y + 1], header.config.separation_m),
     )
 
 
@@ -290,7 +237,7 @@ def _flags(game: Mapping[str, Any]) -> list[tuple[float, float]]:
     return [(float(flag["x_m"]), float(flag["y_m"])) for flag in flags]
 
 
-def _meta(header: LogHeader, tracks: Tracks, title: str, shielded: bool) -> dict[str, Any]:
+def _meta(header: LogHeader, tracks: Tracks) -> dict[str, Any]:
     try:
         rules = GameConfig.preset(header.preset)  # radii to draw
     except ConfigError:
@@ -312,9 +259,9 @@ def _meta(header: LogHeader, tracks: Tracks, title: str, shielded: bool) -> dict
         "separation_m": header.config.separation_m,
         "preset": header.preset,
         "policies": {"blue": "", "red": ""} | {ours: header.policy},
-        "shielded": [name for name, own in zip(tracks.names, tracks.ours, strict=True) if own and shielded],
+        "shielded": [name for name, own in zip(tracks.names, tracks.ours, strict=True) if own],
         "seed": None,
         "reason_names": [reason.name for reason in Reason],
         "platforms": list(tracks.platforms),
-        "title": title,
+        "title": "as it was",
     }

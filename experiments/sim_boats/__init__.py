@@ -1,6 +1,6 @@
 """Boats without boats: simulated hulls behind real MAVLink sockets."""
 
 from .fleet import SimFleet
-from .settings import LATER_FIRMWARE, AutopilotSettings, Firmware, RadioSettings, SimBoat, Water
+from .settings import AutopilotSettings, RadioSettings, SimBoat, Water
 
-__all__ = ["LATER_FIRMWARE", "AutopilotSettings", "Firmware", "RadioSettings", "SimBoat", "SimFleet", "Water"]
+__all__ = ["AutopilotSettings", "RadioSettings", "SimBoat", "SimFleet", "Water"]

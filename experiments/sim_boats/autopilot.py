@@ -1,6 +1,6 @@
 """One boat's autopilot: MAVLink bytes in, MAVLink bytes out, and orders for its hull.
 
-SET_* messages are read as the measured autopilot reads them, traps included; none is acknowledged.
+SET_* messages that runners send are read as the measured autopilot reads them; none is acknowledged.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .hull import Steer, Turn
 from .sensing import Snapshot
 from .settings import AutopilotSettings
 from .telemetry import CAN_SEND, Telemetry
-from .vehicle import PARAMETERS, Mode, Streams, Vehicle
+from .vehicle import PARAMETERS, Streams, Vehicle
 
 COMPONENT = 1
 ACCEPTED, DENIED = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED
@@ -27,10 +27,8 @@ UNSUPPORTED, FAILED = mavlink.MAV_RESULT_UNSUPPORTED, mavlink.MAV_RESULT_FAILED
 _TEXT_BYTES = 50
 _FORCE = 21196.0
 """Second parameter of an arming command that skips the checks."""
-_POSITION, _VELOCITY, _ACCELERATION, _YAW, _YAW_RATE = 7, 56, 448, 1024, 2048
-"""Bits of a position target's type mask that tell to ignore a part."""
+_VELOCITY_ONLY, _LOCAL_FRAMES = 3527, (1, 7)
 _ATTITUDE_RATE_IGNORED, _THRUST_IGNORED = 4, 64
-_LOCAL_FRAMES, _BODY_FRAMES, _GLOBAL_FRAMES = (1, 7), (8, 9), (0, 3, 5, 6, 10, 11)
 
 
 class Autopilot:
@@ -181,37 +179,13 @@ def attitude_target(message: Any, boat: Autopilot) -> Target | None:
 
 
 def position_target(message: Any, boat: Autopilot) -> Target | None:
-    """SET_POSITION_TARGET_LOCAL_NED and SET_POSITION_TARGET_GLOBAL_INT: a velocity, yaw or yaw rate.
-
-    None when it is dropped, as places are: no runner sends one.
-    """
-    is_global = message.get_type() == "SET_POSITION_TARGET_GLOBAL_INT"
-    known = _GLOBAL_FRAMES if is_global else (*_LOCAL_FRAMES, *_BODY_FRAMES)
-    finite = all(map(math.isfinite, (message.vx, message.vy, message.yaw, message.yaw_rate)))
-    ignored = message.type_mask & _POSITION and message.type_mask & _ACCELERATION == _ACCELERATION
-    if message.coordinate_frame not in known or not finite or not ignored:
+    """SET_POSITION_TARGET_LOCAL_NED with a velocity alone; None when it is dropped, as all else is: nobody sends it."""
+    if message.coordinate_frame not in _LOCAL_FRAMES or message.type_mask != _VELOCITY_ONLY:
         return None
-    has_velocity = not message.type_mask & _VELOCITY
-    has_yaw, has_rate = not message.type_mask & _YAW, not message.type_mask & _YAW_RATE
-    if (has_yaw and has_rate) or not (has_velocity or has_yaw or has_rate):
+    if not math.isfinite(message.vx) or not math.isfinite(message.vy):
         return None
-    in_body = not is_global and message.coordinate_frame in _BODY_FRAMES
-    top = boat.vehicle.parameters["WP_SPEED"]
-    speed = min(math.hypot(message.vx, message.vy), top) if has_velocity else 0.0
-    # the trap: with yaw or yaw rate the sign is that of x, also where x is north and not ahead
-    untrapped = has_yaw and not in_body and not boat.vehicle.settings.firmware.yaw_trap
-    if (has_yaw or has_rate) and message.vx < 0.0 and not untrapped:
-        speed = -speed
-    if has_rate:
-        return Turn(message.yaw_rate, speed)
-    heading = message.yaw if has_yaw else math.atan2(message.vy, message.vx)
-    return _steer(boat, heading, speed, in_body)
-
-
-def _steer(boat: Autopilot, heading_rad: float, speed_mps: float, relative: bool) -> Steer:
-    """A target of a true heading, or of one from the bow."""
-    own = boat.snapshot.heading_rad
-    return Steer(own + heading_rad if relative else boat.frame.heading_to_field_rad(heading_rad), speed_mps)
+    speed = min(math.hypot(message.vx, message.vy), boat.vehicle.parameters["WP_SPEED"])
+    return Steer(boat.frame.heading_to_field_rad(math.atan2(message.vy, message.vx)), speed)
 
 
 def _change_mode(boat: Autopilot, base: int, number: float) -> int:
@@ -229,24 +203,6 @@ def _arm(boat: Autopilot, message: Any) -> int:
     return UNSUPPORTED
 
 
-def _get_interval(boat: Autopilot, message: Any) -> int:
-    wanted = int(message.param1)
-    boat._send(mavlink.MAVLink_message_interval_message(wanted, boat.streams.interval_us(wanted)))
-    return ACCEPTED
-
-
-def _yaw_speed(boat: Autopilot, message: Any) -> int:
-    """MAV_CMD_NAV_SET_YAW_SPEED; its speed is not limited."""
-    if not boat.vehicle.settings.firmware.yaw_speed_command:
-        return UNSUPPORTED
-    target = _steer(boat, math.radians(message.param1), message.param2, relative=message.param3 == 1.0)
-    return ACCEPTED if boat.vehicle.take(target, boat.now_s) else FAILED
-
-
-def _change_speed(boat: Autopilot, message: Any) -> int:
-    return FAILED if boat.vehicle.mode is Mode.GUIDED and boat.vehicle.target is not None else ACCEPTED
-
-
 def _reboot(boat: Autopilot, message: Any) -> int:
     boat.reboot_wanted = boat.reboot_wanted or message.param1 in (1.0, 3.0)
     return ACCEPTED if message.param1 in (1.0, 3.0) else DENIED
@@ -258,10 +214,7 @@ _COMMANDS: dict[int, Callable[[Autopilot, Any], int]] = {
     mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: lambda boat, told: (
         ACCEPTED if boat.streams.set_interval(int(told.param1), told.param2) else FAILED
     ),
-    mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: _get_interval,
     mavlink.MAV_CMD_REQUEST_MESSAGE: lambda boat, told: boat._send_now(int(told.param1)),
-    mavlink.MAV_CMD_DO_CHANGE_SPEED: _change_speed,
-    mavlink.MAV_CMD_NAV_SET_YAW_SPEED: _yaw_speed,
     mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: _reboot,
 }
 """What each of COMMAND_LONG and COMMAND_INT does and how it is acknowledged; any other is unsupported."""
@@ -271,14 +224,10 @@ _HANDLERS: dict[str, Callable[[Autopilot, Any], None]] = {
     "COMMAND_LONG": Autopilot._on_command,
     "COMMAND_INT": Autopilot._on_command,
     "SET_MODE": Autopilot._on_set_mode,
-    "REQUEST_DATA_STREAM": lambda boat, told: boat.streams.set_group(
-        told.req_stream_id, told.req_message_rate if told.start_stop else 0
-    ),
     "TIMESYNC": Autopilot._on_time,
     "PARAM_REQUEST_READ": Autopilot._on_parameter_read,
     "PARAM_REQUEST_LIST": Autopilot._on_parameter_list,
     "PARAM_SET": Autopilot._on_parameter_set,
     "SET_ATTITUDE_TARGET": Autopilot._on_target,
     "SET_POSITION_TARGET_LOCAL_NED": Autopilot._on_target,
-    "SET_POSITION_TARGET_GLOBAL_INT": Autopilot._on_target,
 }

@@ -40,7 +40,6 @@ class SimBoat:
         policy: scripted policy that drives the boat while nobody commands it by its link; empty: without commands it
             stays where it is.
         start: x m, y m, heading deg in the field; None: the game's start place.
-        gate: of a boat that runs MOOS: where its commander sits, "helm" or "pid", as in FLEET.yaml.
     """
 
     name: str
@@ -50,28 +49,6 @@ class SimBoat:
     address: str | None = FREE
     policy: str = ""
     start: tuple[float, float, float] | None = None
-    gate: str = "helm"
-
-
-@dataclass(frozen=True)
-class Firmware:
-    """What differs between autopilot versions; the defaults are the one that was measured.
-
-    Attributes:
-        version: major, minor, patch.
-        yaw_trap: velocity with yaw takes the speed's sign from the velocity's x component.
-        yaw_speed_command: obeys MAV_CMD_NAV_SET_YAW_SPEED.
-        timeout_parameter: has GUID_TIMEOUT.
-    """
-
-    version: tuple[int, int, int] = (4, 6, 0)
-    yaw_trap: bool = True
-    yaw_speed_command: bool = True
-    timeout_parameter: bool = False
-
-
-LATER_FIRMWARE = Firmware((4, 8, 0), yaw_trap=False, yaw_speed_command=False, timeout_parameter=True)
-"""One from mid-2026 on."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +62,6 @@ class AutopilotSettings:
         brake_mps2: deceleration of a stop of the autopilot's own (time-out, LOITER); None: the platform's own way.
         back_up_m: run astern after the stop of a time-out.
         top_rate_hz: highest rate of one message.
-        firmware: see `Firmware`.
         parameters: values of parameters that differ from the defaults, by name.
 
     Raises:
@@ -97,7 +73,6 @@ class AutopilotSettings:
     brake_mps2: float | None = 1.2
     back_up_m: float = 2.0
     top_rate_hz: float = 40.0
-    firmware: Firmware = Firmware()
     parameters: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

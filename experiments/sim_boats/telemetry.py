@@ -14,13 +14,14 @@ from .vehicle import Mode, Vehicle
 
 _ESTIMATE_FLAGS = 831
 """EKF_STATUS_REPORT: attitude, velocity and position are good."""
+_VERSION = 4 << 24 | 6 << 16
+"""4.6.0, the one that was measured."""
 _UNIX_2024_US = 1_704_067_200_000_000
 _CAPABILITIES = (
     mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
     | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
     | mavlink.MAV_PROTOCOL_CAPABILITY_SET_ATTITUDE_TARGET
     | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
-    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
     | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
 )
 
@@ -112,9 +113,8 @@ class Telemetry:
         return mavlink.MAVLink_ekf_status_report_message(flags, 0.05, 0.05, 0.05, 0.05, 0.0)
 
     def _autopilot_version(self) -> Any:
-        major, minor, patch = self.vehicle.settings.firmware.version
-        version, none = major << 24 | minor << 16 | patch << 8, [0] * 8
-        return mavlink.MAVLink_autopilot_version_message(_CAPABILITIES, version, 0, 0, 0, none, none, none, 0, 0, 0)
+        none = [0] * 8
+        return mavlink.MAVLink_autopilot_version_message(_CAPABILITIES, _VERSION, 0, 0, 0, none, none, none, 0, 0, 0)
 
 
 CAN_SEND = {

@@ -47,13 +47,12 @@ PARAMETERS: dict[str, tuple[float, int]] = {
     "FS_GCS_ENABLE": (0.0, _INT8),
     "FS_GCS_TIMEOUT": (5.0, REAL32),
     "FS_TIMEOUT": (1.5, REAL32),
-    "GUID_TIMEOUT": (3.0, REAL32),
     "INITIAL_MODE": (0.0, _INT8),
     "LOIT_RADIUS": (2.0, REAL32),
     "OA_TYPE": (0.0, _INT8),
     "WP_SPEED": (2.0, REAL32),
 }
-"""Defaults and MAV_PARAM_TYPEs; GUID_TIMEOUT only where the firmware has it."""
+"""Defaults and MAV_PARAM_TYPEs."""
 
 WARNING, CRITICAL, INFO = 4, 2, 6
 """Severities of texts."""
@@ -80,8 +79,7 @@ class Vehicle:
 
     def __init__(self, settings: AutopilotSettings) -> None:
         self.settings = settings
-        known = [name for name in PARAMETERS if name != "GUID_TIMEOUT" or settings.firmware.timeout_parameter]
-        self.parameters = {name: PARAMETERS[name][0] for name in sorted(known)}
+        self.parameters = {name: PARAMETERS[name][0] for name in sorted(PARAMETERS)}
         for name, value in settings.parameters.items():
             if name not in self.parameters:
                 near = difflib.get_close_matches(name, self.parameters, n=1)
@@ -150,7 +148,7 @@ class Vehicle:
 
     def tick(self, now_s: float) -> None:
         """Look at the clocks: targets that grew old, ground stations gone silent."""
-        limit = self.parameters.get("GUID_TIMEOUT", self.settings.timeout_s)
+        limit = self.settings.timeout_s
         if self.target is not None and now_s - self._target_s > limit:
             self.texts.append((WARNING, f"target not received last {limit:g}secs, stopping"))
             self.target, self._timed_out = None, True
@@ -170,17 +168,6 @@ class Vehicle:
 
 
 HEARTBEAT, HEARTBEAT_S = mavlink.MAVLINK_MSG_ID_HEARTBEAT, 1.0
-GROUPS: dict[int, tuple[int, ...]] = {
-    mavlink.MAV_DATA_STREAM_EXTENDED_STATUS: (mavlink.MAVLINK_MSG_ID_SYS_STATUS, mavlink.MAVLINK_MSG_ID_GPS_RAW_INT),
-    mavlink.MAV_DATA_STREAM_POSITION: (
-        mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
-        mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
-    ),
-    mavlink.MAV_DATA_STREAM_EXTRA1: (mavlink.MAVLINK_MSG_ID_ATTITUDE,),
-    mavlink.MAV_DATA_STREAM_EXTRA2: (mavlink.MAVLINK_MSG_ID_VFR_HUD,),
-    mavlink.MAV_DATA_STREAM_EXTRA3: (mavlink.MAVLINK_MSG_ID_SYSTEM_TIME, mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT),
-}
-"""Messages of REQUEST_DATA_STREAM's groups."""
 
 
 class Streams:
@@ -202,18 +189,6 @@ class Streams:
         elif message == HEARTBEAT:
             self._interval_s[message] = HEARTBEAT_S
         return True
-
-    def set_group(self, group: int, rate_hz: int) -> None:
-        """REQUEST_DATA_STREAM: all messages of a group, 0 Hz stops them."""
-        for number, messages in GROUPS.items():
-            for message in messages if group in (number, mavlink.MAV_DATA_STREAM_ALL) else ():
-                self.set_interval(message, 1e6 / rate_hz if rate_hz > 0 else -1.0)
-
-    def interval_us(self, message: int) -> int:
-        """Present interval, us; -1: not sent, 0: unknown."""
-        if message not in self._known:
-            return 0
-        return round(self._interval_s[message] * 1e6) if message in self._interval_s else -1
 
     def due(self, now_s: float) -> list[int]:
         """Messages to send now; one that fell behind is sent once.

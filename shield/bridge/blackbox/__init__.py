@@ -11,13 +11,12 @@ How to use it::
     check_disk(folder, boats=6)                              # before the start: a CheckResult
     with LogReader(path) as log:                             # also of a log cut off by a crash
         for tick in log.ticks(): ...
-    mend(path, target)                                       # what is left of such a log, for viewers
 """
 
 from .disk import Disk, TlogWriter, check_disk
 from .hash_chain import ChainCheck
 from .header import LoggedBoat, LogHeader, header_of_fleet, platforms_of
-from .reader import LogLine, LogReader, mend
+from .reader import LogLine, LogReader
 from .recorder import McapWriter, log_path
 
 __all__ = [
@@ -32,6 +31,5 @@ __all__ = [
     "check_disk",
     "header_of_fleet",
     "log_path",
-    "mend",
     "platforms_of",
 ]

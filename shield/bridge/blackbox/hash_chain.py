@@ -146,11 +146,10 @@ class ChainCheck:
         codes_checked: how many codes were found right.
         breaks: what does not fit, in words, `MOST_BREAKS` at most.
         broken: how many things do not fit.
-        is_mended: the file says that `reader.mend` wrote it from one that was cut off.
     """
 
     def __init__(self, key: bytes | None = None) -> None:
-        self.keyed = self.is_mended = False
+        self.keyed = False
         self.codes_checked = self.broken = 0
         self.breaks: list[str] = []
         self._key, self._end, self._early = key, "", 0
@@ -202,11 +201,11 @@ class ChainCheck:
 
     def close(self, is_closed: bool) -> None:
         """The file's records are at their end; if it was not completed, its writer was killed, or its end cut off."""
-        if self.chained and is_closed and not self._end and not self.is_mended:
+        if self.chained and is_closed and not self._end:
             self._tell("its end was cut off and the file closed again")
 
     def _look_for_end(self) -> None:
-        if self._end or self.is_mended:
+        if self._end:
             self._tell("records follow after the end of the file")
 
     def _compare(self, found: Link, chain: Chain) -> None:

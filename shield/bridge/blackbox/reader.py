@@ -15,18 +15,15 @@ from typing import IO, Any
 from mcap.exceptions import EndOfFile, McapError
 from mcap.records import Channel, Chunk, Footer, Message, Schema
 from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
-from mcap.writer import Writer
 from zstandard import ZstdError
 
 from ...compat import Self
 from ...exceptions import LogError
 from ..messages import Tick
-from .disk import Disk
-from .format import Schema as JsonSchema
 from .format import tick_from_json
 from .hash_chain import ChainCheck
 from .header import LogHeader
-from .recorder import HEADER_TOPIC, LINK_TOPIC, LOG_TOPIC, MENDED_TOPIC, TICK_TOPIC
+from .recorder import HEADER_TOPIC, LINK_TOPIC, LOG_TOPIC, TICK_TOPIC
 
 LOG = logging.getLogger(__name__)
 
@@ -35,14 +32,6 @@ LARGEST_RECORD = 64 << 20
 _DAMAGE = (McapError, CRCValidationError, ZstdError, struct.error, UnicodeDecodeError, MemoryError, OverflowError)
 _PART = re.compile(r"(?P<first>.+)\.part[1-9]\d*(?P<ending>\.[^.]*)")
 PARTS = "is in parts, as 0.8.0 wrote runs of more than 20 minutes; replay it with steerclear 0.8.0"
-
-MENDED: JsonSchema = {
-    "$schema": "https://json-schema.org/draft/2020-12/schema",
-    "title": "steerclear.Mended",
-    "type": "object",
-    "description": "The file was written from one that was cut off.",
-    "properties": {"damage": {"type": "array", "items": {"type": "string"}}},
-}
 
 Tell = Callable[[str], None]
 
@@ -70,7 +59,7 @@ class LogReader:
     Attributes:
         header: what the shield was built with.
         files: those read: the one.
-        complete: whether the log was closed, if only by `mend`; known once `entries` is used up.
+        complete: whether the log was closed; known once `entries` is used up.
         damage: what could not be read, in words; likewise.
         chain: what the log's chain says; likewise.
     """
@@ -157,8 +146,6 @@ class LogReader:
                     self.chain.link(_object(item))
                 except LogError:
                     self.chain.link({})
-            elif topic == MENDED_TOPIC:
-                self.chain.is_mended = True
             else:
                 self.chain.add(topic, (item.log_time, item.publish_time, item.sequence), item.data)
                 yield topic, item
@@ -207,53 +194,3 @@ def read_records(file: IO[bytes], tell: Tell) -> Iterator[Any]:
         if isinstance(error, struct.error) and not closed and not file.read(1):
             return  # cut off within a number: the same
         tell(f"from some point on it makes no sense ({type(error).__name__})")
-
-
-def mend(source: Path, target: Path) -> tuple[int, list[str]]:
-    """Write what can be read of a log as a whole file with an index, which viewers open that refuse a cut-off one.
-
-    Args:
-        source: the log.
-        target: new file.
-
-    Returns:
-        Messages written, and what could not be read.
-
-    Raises:
-        LogError: the log cannot be opened or holds nothing, or the file cannot be written.
-        BridgeError: the file cannot be made.
-    """
-    damage: list[str] = []
-    try:
-        with source.open("rb") as file:
-            return _copy(read_records(file, damage.append), target, damage), damage
-    except OSError as error:
-        raise LogError(f"cannot mend {source} ({error.strerror}); check both paths and the room on the disk") from None
-
-
-def _copy(records: Iterator[Any], target: Path, damage: list[str]) -> int:
-    disk = Disk(target)
-    writer = Writer(disk)  # type: ignore[arg-type]
-    writer.start(library="steerclear")
-    schemas: dict[int, int] = {}
-    channels: dict[int, int] = {}
-    count, last_ns, is_whole = 0, 0, False
-    for item in records:
-        if isinstance(item, Schema) and item.id not in schemas:
-            schemas[item.id] = writer.register_schema(item.name, item.encoding, item.data)
-        elif isinstance(item, Channel) and item.id not in channels and item.schema_id in schemas:
-            channels[item.id] = writer.register_channel(item.topic, item.message_encoding, schemas[item.schema_id])
-        elif isinstance(item, Message) and item.channel_id in channels:
-            count, last_ns = count + 1, item.log_time
-            writer.add_message(channels[item.channel_id], item.log_time, item.data, item.publish_time, item.sequence)
-            disk.flush()
-        is_whole = isinstance(item, Footer)
-    if not is_whole:  # say in the file that it was cut off: it is closed, and yet not whole
-        schema = writer.register_schema(MENDED["title"], "jsonschema", json.dumps(MENDED).encode())
-        channel = writer.register_channel(MENDED_TOPIC, "json", schema)
-        writer.add_message(channel, last_ns, json.dumps({"damage": damage}).encode(), last_ns, 1)
-        count += 1
-    writer.finish()
-    disk.flush()
-    disk.close()
-    return count

@@ -25,7 +25,7 @@ from .nonfinite import plain
 
 LOG = logging.getLogger(__name__)
 
-TICK_TOPIC, HEADER_TOPIC, LOG_TOPIC, LINK_TOPIC, MENDED_TOPIC = "/tick", "/header", "/log", "/link", "/mended"
+TICK_TOPIC, HEADER_TOPIC, LOG_TOPIC, LINK_TOPIC = "/tick", "/header", "/log", "/link"
 SCENE_TOPIC, FIELD_TOPIC, FIX_TOPIC = "/scene", "/field", "/fix/"
 EVERY_S = {SCENE_TOPIC: 0.2, FIX_TOPIC: 1.0, FIELD_TOPIC: 10.0}
 LINK = schema_of(Link, "steerclear.Link")

@@ -7,7 +7,7 @@ import random
 import pytest
 from forged_logs import read_records, write_records
 from logged_runs import write_log
-from steerclear.experiments.deploy.replay import as_content, draw, replay_log
+from steerclear.experiments.deploy.replay import as_content, judge, replay_log
 from steerclear.shield.bridge.blackbox import LogReader
 from steerclear.shield.exceptions import SteerclearError
 
@@ -61,7 +61,7 @@ def replayed(path, keep_tracks):
     try:
         with LogReader(path) as log:
             found = replay_log(log, keep_tracks)
-        draw(found)
+        judge(found)
     except SteerclearError as error:
         assert "\n" not in str(error)  # noqa: PT017 - other errors are the failure
         return None

@@ -1,4 +1,4 @@
-"""The referee: the rules of the env over boats that nobody but the water moves, heard by feed or at their own links."""
+"""The referee: the rules of the env over boats that nobody but the water moves, heard by the feed."""
 
 import contextlib
 import json
@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 
 import numpy as np
 import pytest
@@ -20,7 +19,7 @@ from steerclear.env.mctf import MctfEnv
 from steerclear.experiments.cli import app
 from steerclear.experiments.deploy import referee as referee_module
 from steerclear.experiments.deploy.demo import free_ports
-from steerclear.experiments.deploy.referee import Hearing, Referee
+from steerclear.experiments.deploy.referee import Referee
 from steerclear.experiments.deploy.rules import Umpire, game_config, player_names, state_of
 from steerclear.experiments.sim_boats import AutopilotSettings, SimFleet
 from steerclear.shield.bridge.clock import ManualClock, MonotonicClock
@@ -46,14 +45,13 @@ boats:
 """
 FEED = 'feed: {{listen: "127.0.0.1:{}", referee: "127.0.0.1:{}"}}'
 UDP = 'link: {{kind: mavlink, address: "udpin:127.0.0.1:{}", system_id: {}}}'
-MOOS = 'link: "moos://127.0.0.1:{}"'
 QUICK = {"autopilot": AutopilotSettings(boot_s=0.0)}
 
 
-def text_of(feed=FEED, link=UDP, seconds=600.0):
+def text_of(feed=FEED, seconds=600.0):
     """A file of one against one, both with links, on free ports."""
     ports = free_ports(4)
-    links = {"link": link.format(ports[0], 1), "other": link.format(ports[1], 2)}
+    links = {"link": UDP.format(ports[0], 1), "other": UDP.format(ports[1], 2)}
     return FLEET.format(feed=feed.format(*ports[2:]), seconds=seconds, **links)
 
 
@@ -222,8 +220,6 @@ def test_it_stops_when_told_and_when_time_is_up(fleet_file):
 
 
 def test_without_addresses_or_players_there_is_no_referee(fleet_file, fleet_of):
-    with pytest.raises(FleetFileError, match=r"add feed\.referee"):
-        Referee(load_fleet(fleet_file('feed: {{listen: "127.0.0.1:{}"}}')), ManualClock())
     fleet = load_fleet(fleet_file())
     with Referee(fleet, ManualClock()), pytest.raises(BridgeError, match="cannot hear the feed"):
         Referee(fleet, ManualClock())
@@ -280,39 +276,12 @@ def test_an_interrupted_referee_says_so(fleet_file):
     assert "interrupted" in said
 
 
-def test_links_are_listened_to_and_left_as_they_were():
-    fleet, clock = parse_fleet(text_of()), MonotonicClock()
-    with SimFleet.from_file(fleet, **QUICK, feed_to=(), waits=True) as boats:
-        vehicles = [boat.autopilot.vehicle for boat in boats.boats.values()]
-        before = [(vehicle.mode, vehicle.armed) for vehicle in vehicles]
-        with Hearing(fleet, clock, links=True) as hearing:
-            wait_for(lambda: len(hearing.contacts()) == 2)
-            found = {contact.boat: contact for contact in hearing.contacts()}
-            assert found["b1"].position_m == pytest.approx((25.0, 20.0), abs=0.1)
-            assert found["r1"].position_m == pytest.approx((55.0, 20.0), abs=0.1)
-            now_s = clock.now_s()
-            with FeedSender("hub", [fleet.feed.referee]) as sender:
-                sender.send_positions([Fix("b1", 42.0, -71.0, 0.0, 1.0, 60.0, 0.1)])
-                wait_for(lambda: hearing.feed.read())
-            assert all(contact.fixed_s > now_s - 10.0 for contact in hearing.contacts()), "of two the fresher one"
-        time.sleep(0.2)
-        assert [(vehicle.mode, vehicle.armed) for vehicle in vehicles] == before
-
-
-def test_boats_that_run_moos_are_heard_at_their_links_too():
-    fleet = parse_fleet(text_of(feed="", link=MOOS))
-    with SimFleet.from_file(fleet, **QUICK, feed_to=()) as boats:
-        with Hearing(fleet, MonotonicClock(), links=True) as hearing:
-            wait_for(lambda: {contact.boat for contact in hearing.contacts()} == {"b1", "r1"})
-        assert not boats.boats["b1"].is_commanded
-
-
 def test_it_must_be_told_where_to_hear():
-    fleet = parse_fleet(text_of(feed=""))
-    with pytest.raises(FleetFileError, match="give --listen or --links"):
-        Hearing(fleet, MonotonicClock())
-    with Hearing(fleet, MonotonicClock(), listen="127.0.0.1:0") as hearing:
-        assert hearing.contacts() == ()
+    fleet = parse_fleet(text_of(feed='feed: {{listen: "127.0.0.1:{}"}}'))
+    with pytest.raises(FleetFileError, match="give --listen"):
+        Referee(fleet, MonotonicClock())
+    with Referee(fleet, MonotonicClock(), listen="127.0.0.1:0") as referee:
+        assert referee.contacts() == ()
 
 
 def test_with_signing_boats_and_referee_sign_what_they_say_and_nobody_else_is_heard(tmp_path):
@@ -327,10 +296,10 @@ def test_with_signing_boats_and_referee_sign_what_they_say_and_nobody_else_is_he
         FeedSender("gps_hub", [fleet.feed.listen, fleet.feed.referee]) as liar,
         SimFleet.from_file(fleet, **QUICK) as boats,
     ):
-        wait_for(lambda: liar.send_positions([strange]) or len(referee.hearing.contacts()) == 2)
+        wait_for(lambda: liar.send_positions([strange]) or len(referee.contacts()) == 2)
         wait_for(lambda: referee.turn() and runner.game() is not None and len(runner.read()) == 2)
         x_m, y_m = boats.states()["r1"][:2]
-        for told in (runner.read(), referee.hearing.contacts()):
+        for told in (runner.read(), referee.contacts()):
             found = {contact.boat: contact for contact in told}
             assert found["r1"].position_m == pytest.approx((x_m, y_m), abs=0.5)
         wait_for(lambda: liar.send_positions([strange]) or runner.faults().get("unsigned", 0) > 3)

@@ -9,7 +9,6 @@ import pytest
 from forged_logs import read_records, write_records
 from json_keys import KEYS, undocumented
 from logged_runs import Encounter, header_of, write_log
-from steerclear.env.record import load
 from steerclear.experiments.cli import app
 from steerclear.shield import ShieldConfig
 from steerclear.shield.bridge.blackbox import McapWriter
@@ -182,19 +181,18 @@ def test_a_file_with_more_or_less_than_was_written_is_not_proved(tmp_path, log, 
     assert "NOT PROVED" in said
 
 
-def test_a_log_that_was_killed_is_told_as_such_not_as_forged_and_is_mended(tmp_path, log):
+def test_a_log_that_was_killed_is_told_as_such_not_as_forged(tmp_path, log):
     whole, path = log.read_bytes(), tmp_path / "x.mcap"
-    for cut in range(len(whole) // 2, len(whole) // 2 + 12):  # within the head of a record, and its body
+    for cut in (
+        len(whole) // 2,
+        len(whole) // 2 + 5,
+        len(whole) // 2 + 11,
+    ):  # within the head of a record, and its body
         path.write_bytes(whole[:cut])
         code, said = run(path)
         assert code == 0, said
         assert "not closed (crash, power or kill)" in said
         assert "Hash chain: verified up to where the log ends. It carries no codes" in said
-    assert run(path, "--mend", tmp_path / "mended.mcap")[0] == 0
-    code, said = run(tmp_path / "mended.mcap")
-    assert code == 0
-    assert "not closed" not in said
-    assert "cut off (crash, power or kill) and mended" in said
 
 
 def test_a_log_in_which_nothing_was_decided_proves_nothing(tmp_path):
@@ -210,7 +208,7 @@ def test_a_log_in_which_nothing_was_decided_proves_nothing(tmp_path):
     code, said = run(tmp_path / "y.mcap")
     assert code == 3
     assert "no decision of the shield: nothing is proved" in said
-    assert run(tmp_path / "y.mcap", "--without-shield")[0] == 2
+    assert run(tmp_path / "y.mcap", "--judge")[0] == 2
 
 
 def test_codes_are_checked_with_the_key(tmp_path, ticks):
@@ -236,36 +234,22 @@ def test_a_log_of_another_program_says_so_though_all_is_the_same(tmp_path, ticks
     assert "Made by steerclear 0.9, sources abcdef01. Not all is as here, and this program may decide otherwise" in said
 
 
-def test_without_the_shield_with_everything_written(log, tmp_path):
-    files = {name: tmp_path / f"out.{name}" for name in ("html", "npz", "json")}
-    options = ["--html", files["html"], "--record", files["npz"], "--json", files["json"]]
-    code, said = run(log, "--without-shield", *options)
+@pytest.mark.parametrize("shielded", [True, False])
+def test_breaches_that_happened_are_judged_and_drawn_when_asked_for(tmp_path, shielded):
+    write_log(tmp_path / "x.mcap", STEPS, header=HEADER, shielded=shielded)
+    files = {name: tmp_path / f"out.{name}" for name in ("html", "json")}
+    code, said = run(tmp_path / "x.mcap", "--judge", "--html", files["html"], "--json", files["json"])
     assert code == 0, said
     content = json.loads(files["json"].read_text())
     assert undocumented(content, KEYS["replay"]) == []
-    shielded, without = (content["sides"][side] for side in ("with", "without"))
-    assert shielded["breaches_opponent"] == shielded["breaches_teammate"] == 0
-    assert without["breaches_opponent"] + without["breaches_teammate"] > 0
-    assert without["closest_opponent_m"] < 2.5 < shielded["closest_opponent_m"]
-    assert content["stretches"] > 0
-    assert content["different"] == content["strayed"] == content["unfounded"] == 0
-    assert content["first_sent"] is None
-    assert content["files"] == [str(files["html"]), str(files["npz"])]
-    assert all(words in files["html"].read_text() for words in ("as it was", "without the shield"))
-    assert load(files["npz"])["position"].shape == (STEPS, 4, 2)
+    verdicts = {breach["verdict"] for breach in content["breaches"]}
+    assert verdicts == (set() if shielded else {"avoidable"})
+    assert len(verdicts) == (content["breaches_opponent"] + content["breaches_teammate"] > 0)
+    assert (content["closest_opponent_m"] > 2.5) == shielded
+    assert content["files"] == [str(files["html"])]
+    assert "as it was" in files["html"].read_text()
     assert "closest teammate" in said
-
-
-@pytest.mark.parametrize(("options", "verdict"), [((), "avoidable"), (("--no-judge",), "not_judged")])
-def test_breaches_that_happened_get_verdicts_unless_left_out(tmp_path, options, verdict):
-    write_log(tmp_path / "crash.mcap", STEPS, header=HEADER, shielded=False)
-    code, said = run(tmp_path / "crash.mcap", "--without-shield", *options, "--json", tmp_path / "out.json")
-    assert code == 0, said
-    content = json.loads((tmp_path / "out.json").read_text())
-    assert undocumented(content, KEYS["replay"]) == []
-    assert {breach["verdict"] for breach in content["sides"]["with"]["breaches"]} == {verdict}
-    assert "Breaches that happened" in said
-    assert options or verdict in said
+    assert ("Breaches of 2.5 m" in said) == (not shielded)
 
 
 @pytest.mark.parametrize(

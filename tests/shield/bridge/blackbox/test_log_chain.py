@@ -12,7 +12,7 @@ from forged_logs import read_records, write_records
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from logged_runs import Encounter, header_of
-from steerclear.shield.bridge.blackbox import LogReader, McapWriter, mend
+from steerclear.shield.bridge.blackbox import LogReader, McapWriter
 from steerclear.shield.bridge.blackbox.format import tick_to_json
 from steerclear.shield.bridge.blackbox.hash_chain import Chain, ChainHead, Link
 from steerclear.shield.exceptions import LogError
@@ -185,27 +185,6 @@ def test_a_log_that_was_killed_is_no_forgery(log, tmp_path_factory, share):
             assert reader.chain.holds
     except LogError:
         assert share < 0.5, "cut off before its header"
-
-
-def test_a_mended_log_says_that_it_was_cut_off(log, tmp_path):
-    cut, mended, again = (tmp_path / name for name in ("cut.mcap", "mended.mcap", "again.mcap"))
-    whole = log.read_bytes()
-    cut.write_bytes(whole[: len(whole) // 2])
-    mend(cut, mended)
-    chain, numbers = check(mended)
-    assert chain.holds
-    assert chain.is_mended
-    assert numbers == list(range(len(numbers)))
-    mend(mended, again)
-    assert check(again)[0].is_mended
-    assert "records follow" in said(write_records(tmp_path / "x.mcap", [*read_records(mended), read_records(log)[-2]]))
-
-
-def test_mending_a_whole_log_leaves_it_whole(log, tmp_path):
-    mend(log, tmp_path / "mended.mcap")
-    chain, _ = check(tmp_path / "mended.mcap")
-    assert chain.holds
-    assert not chain.is_mended
 
 
 def test_a_chunk_that_is_damaged_shows_in_the_chain_too(log, tmp_path):

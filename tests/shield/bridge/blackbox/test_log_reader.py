@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from logged_runs import Encounter, header_of, write_log
-from mcap.reader import make_reader
-from steerclear.shield.bridge.blackbox import LogReader, McapWriter, mend
+from steerclear.shield.bridge.blackbox import LogReader, McapWriter
 from steerclear.shield.exceptions import LogError
 
 quick = settings(max_examples=80, deadline=None, derandomize=True)
@@ -120,25 +119,3 @@ def test_another_programs_log_is_said(tmp_path):
 def test_a_log_without_ticks_is_whole(tmp_path):
     write_log(tmp_path / "x.mcap", 0)
     assert numbers(tmp_path / "x.mcap") == ([], True, [])
-
-
-def test_a_cut_log_is_mended_into_one_that_viewers_open(log):
-    folder, ticks, whole = log
-    cut, mended = folder / "half.mcap", folder / "mended.mcap"
-    cut.write_bytes(whole[: len(whole) // 2])
-    count, damage = mend(cut, mended)
-    assert len(damage) <= 1  # the chunk that was cut
-    found, complete, _ = numbers(mended)
-    assert found == numbers(cut)[0]
-    assert len(found) > 10
-    assert complete
-    with mended.open("rb") as file:
-        assert make_reader(file).get_summary().statistics.message_count == count
-    with LogReader(mended) as reader:
-        for tick, back in zip(ticks, reader.ticks(), strict=False):
-            assert back.fleet.state.tobytes() == tick.fleet.state.tobytes()
-
-
-def test_mending_says_what_is_wrong(tmp_path):
-    with pytest.raises(LogError, match="cannot mend"):
-        mend(tmp_path / "none.mcap", tmp_path / "out.mcap")
