@@ -153,38 +153,46 @@ class DemoOptions:
     link: Annotated[str, o.option("KIND", "With --demo: what our boats run, mavlink or moos.")] = "mavlink"
 
 
+@dataclass(frozen=True)
+class PolicyOptions:
+    """What steers."""
+
+    policy: Annotated[str, o.option("NAME", "Policy of our boats: a name or a submission's path.")] = "medium"
+    seed: o.DrawSeed = 0
+    trust: o.Trust = False
+
+
 @command()
 def deploy(
     how: BoatOptions,
     demo: DemoOptions,
+    what: PolicyOptions,
     fleet: Annotated[
         Path | None, typer.Argument(metavar="FLEET.yaml", help="Boats, links, geofence, limits.", show_default=False)
     ] = None,
-    policy: Annotated[str, o.option("NAME", "Policy of our boats: a name or a submission's path.")] = "medium",
     minutes: Annotated[float | None, o.option("MIN", "How long.", default="until q or Ctrl-C")] = None,
-    seed: o.DrawSeed = 0,
     plain: Annotated[bool, o.flag("Lines instead of the dashboard; no keys but Ctrl-C.", "--plain")] = False,
-    trust: o.Trust = False,
     json_file: o.JsonFile = None,
 ) -> None:
     """Steer the boats of a FLEET.yaml by a policy, every command through the shield; boats are left stopped.
 
     Exit status: 0 done, 1 checks do not allow the start, 2 bad input, 130 interrupted.
     """
+    policy = what.policy
     if demo.demo:
         policies.check(demo.opponents)
         demo_text(demo.link)
     if policy != MOOS_POLICY:
         policies.check(policy)
-        say_what_runs((policy,), trust, warn)
+        say_what_runs((policy,), what.trust, warn)
     if fleet is None and not demo.demo:
         raise ConfigError("give a FLEET.yaml, or --demo for boats that come with the package")
     if minutes is not None and not 0.0 < minutes <= 24.0 * 60.0:
         raise ConfigError(f"--minutes is {minutes:g}; give more than 0, at most a day")
-    check_seed(seed)
+    check_seed(what.seed)
     if how.boat is not None and fleet is None:
         demo_fleet(demo.link).commanded(how.boat)  # before its boats are simulated
-    told = {"minutes": minutes, "seed": seed, "trust": trust, "begun_unix_s": time.time()}
+    told = {"minutes": minutes, "seed": what.seed, "trust": what.trust, "begun_unix_s": time.time()}
     if demo.demo:  # simulated boats on this machine obey at once
         told |= {"untold_delay_s": 0.0} | ({"connect_s": max(how.wait, 60.0)} if how.wait > 0.0 else {})
     orders = how.orders(fleet or Path(), policy, **told)

@@ -123,15 +123,11 @@ def sim_boats(
     record: Annotated[
         Path | None, o.option("FILE", "Write what really happened (.npz) for render.", "--record"), NEW
     ] = None,
-    check: Annotated[
-        bool, o.flag("Exit with status 1 after a breach of teammates or an avoidable one.", "--check")
-    ] = False,
     json_file: o.JsonFile = None,
 ) -> None:
     """Simulate the boats of a FLEET.yaml: MAVLink autopilots at its links, scripted opponents, the position feed.
 
-    Runs until Ctrl-C or for --duration. Exit status: 0 done, 1 a goal is not met (with --check), 2 bad input, 130
-    interrupted before --duration was over.
+    Runs until Ctrl-C or for --duration. Exit status: 0 done, 2 bad input, 130 interrupted before --duration was over.
     """
     if how.with_parent:
         end_with_parent()
@@ -143,22 +139,7 @@ def sim_boats(
     if (fleet is None) != how.demo:
         raise ConfigError("give a FLEET.yaml, or --demo for the one that comes with the package")
     file = demo_fleet() if fleet is None else load_fleet(fleet)
-    boats = SimFleet.from_file(
-        file,
-        opponents=how.opponents,
-        speed=how.speed,
-        autopilot=AutopilotSettings(boot_s=hulls.boot),
-        water=sea.given(),
-        radio=RadioSettings(loss=radio.loss, delay_s=radio.delay, jitter_s=radio.jitter),
-        noise=hulls.noise,
-        seed=how.seed,
-        record=record is not None or check,
-        waits=not how.no_wait,
-        random_start=how.random_start,
-        allow_remote=how.allow_remote,
-        hulls=_hulls(file, hulls.really, hulls.off, how.seed),
-    )
-    started = time.perf_counter()
+    boats, started = _boats(file, how, sea, radio, hulls, record is not None), time.perf_counter()
     try:
         plan = Plan([parse_incident(text) for text in hulls.fault or []], boats)
         out().print(boats_table(boats))
@@ -176,7 +157,26 @@ def sim_boats(
         write_json(json_file, {**content, "settings": settings, "wall_s": wall_s, "files": files})
     if cut_short and duration is not None:
         raise Interrupted(f"interrupted after {content['simulated_s']:.0f} of {duration:g} simulated s")
-    finish(not check or content["clean"])
+
+
+def _boats(
+    file: FleetFile, how: SimulatedOptions, sea: SeaOptions, radio: RadioOptions, hulls: HullOptions, record: bool
+) -> SimFleet:
+    return SimFleet.from_file(
+        file,
+        opponents=how.opponents,
+        speed=how.speed,
+        autopilot=AutopilotSettings(boot_s=hulls.boot),
+        water=sea.given(),
+        radio=RadioSettings(loss=radio.loss, delay_s=radio.delay, jitter_s=radio.jitter),
+        noise=hulls.noise,
+        seed=how.seed,
+        record=record,
+        waits=not how.no_wait,
+        random_start=how.random_start,
+        allow_remote=how.allow_remote,
+        hulls=_hulls(file, hulls.really, hulls.off, how.seed),
+    )
 
 
 def _hulls(file: FleetFile, really: str | None, off: float, seed: int) -> Hulls | None:

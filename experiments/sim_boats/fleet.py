@@ -6,6 +6,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from multiprocessing.connection import wait
 from pathlib import Path
 from types import TracebackType
@@ -27,7 +28,7 @@ from steerclear.shield.platforms import Platform
 from .boat import Boat, Setting
 from .game import Game, game_of, playing, start_places
 from .hull import STEP_S, Weather
-from .settings import AutopilotSettings, RadioSettings, SimBoat, Water
+from .settings import AutopilotSettings, RadioSettings, SimBoat, Water, check_bounds
 from .truth import Approach, TruthRecord, record_of
 from .wires import Ports, near
 from .world import PositionHub, World
@@ -72,14 +73,11 @@ def boats_of(fleet: FleetFile, opponents: str, hulls: Hulls | None = None) -> li
     return boats
 
 
-class SimFleet:
-    """Simulated boats. A context manager: entering it starts the thread, leaving it gives everything back.
+@dataclass(frozen=True)
+class SimSettings:
+    """How simulated boats live.
 
-    Their time begins with the start and is counted in s of ``clock``. Boats with a policy are driven by it
-    from the moment on at which all other boats of the game have been commanded for 5 s (see ``waits`` and `play`).
-
-    Args:
-        boats: who they are.
+    Attributes:
         origin: latitude and longitude of the field's corner, deg.
         y_axis_deg: true course of the field's y axis, deg.
         speed: times faster than real time; all rates and the autopilots' clocks go along.
@@ -93,11 +91,48 @@ class SimFleet:
         preset: rules of the game that the boats play when there are as many red ones as blue ones.
         rules: settings of the game that differ from the preset's.
         feed_to: HOST:PORT of each listener of the position feed.
-        record: whether everything is recorded, see `truth_record`.
+        record: whether everything is recorded, see `SimFleet.truth_record`.
         separation_m: radius for breaches in the record.
         waits: whether policies wait for the other boats to be commanded.
         random_start: draw start places from ``seed`` instead of taking the game's fixed ones.
         allow_remote: whether links may leave this machine.
+
+    Raises:
+        ConfigError: the noise is out of range.
+    """
+
+    origin: tuple[float, float] = (42.0, -71.0)
+    y_axis_deg: float = 0.0
+    speed: float = 1.0
+    clock: Clock | None = None
+    autopilot: AutopilotSettings = field(default_factory=AutopilotSettings)
+    water: Water = field(default_factory=Water)
+    radio: RadioSettings = field(default_factory=RadioSettings)
+    noise: float = 0.0
+    seed: int = 0
+    key: bytes | None = None
+    preset: str | GameConfig = "aamas2024"
+    rules: Mapping[str, Any] = field(default_factory=dict)
+    feed_to: Sequence[str] = ()
+    record: bool = False
+    separation_m: float = DEFAULT_SEPARATION_M
+    waits: bool = True
+    random_start: bool = False
+    allow_remote: bool = False
+
+    def __post_init__(self) -> None:
+        check_bounds(self, noise=(0.0, 100.0))
+
+
+class SimFleet:
+    """Simulated boats. A context manager: entering it starts the thread, leaving it gives everything back.
+
+    Their time begins with the start and is counted in s of ``clock``. Boats with a policy are driven by it
+    from the moment on at which all other boats of the game have been commanded for 5 s (see ``waits`` and `play`).
+
+    Args:
+        boats: who they are.
+        **settings: of `SimSettings`, which says what each is.
 
     Attributes:
         boats: by name.
@@ -109,59 +144,37 @@ class SimFleet:
         ConfigError: boats that contradict each other, an address that cannot be used, or a setting out of range.
     """
 
-    def __init__(
-        self,
-        boats: Sequence[SimBoat],
-        *,
-        origin: tuple[float, float] = (42.0, -71.0),
-        y_axis_deg: float = 0.0,
-        speed: float = 1.0,
-        clock: Clock | None = None,
-        autopilot: AutopilotSettings | None = None,
-        water: Water | None = None,
-        radio: RadioSettings | None = None,
-        noise: float = 0.0,
-        seed: int = 0,
-        key: bytes | None = None,
-        preset: str | GameConfig = "aamas2024",
-        rules: Mapping[str, Any] | None = None,
-        feed_to: Sequence[str] = (),
-        record: bool = False,
-        separation_m: float = DEFAULT_SEPARATION_M,
-        waits: bool = True,
-        random_start: bool = False,
-        allow_remote: bool = False,
-    ) -> None:
+    def __init__(self, boats: Sequence[SimBoat], **settings: Any) -> None:
         if not boats or len({boat.name for boat in boats}) < len(boats):
             raise ConfigError("give at least one boat, each with a name of its own")
-        if not 0.0 <= noise <= 100.0:
-            raise ConfigError(f"noise is {noise}; give 0 for none, 1 as measured, at most 100")
-        self.frame = FieldFrame(*origin, y_axis_deg)
-        self.clock: Clock = MonotonicClock(speed) if clock is None else clock
+        told = SimSettings(**settings)
+        self.frame = FieldFrame(*told.origin, told.y_axis_deg)
+        self.clock: Clock = MonotonicClock(told.speed) if told.clock is None else told.clock
         self.let_go_s = self.cpu_s = 0.0
         self._lock, self._ends, self._ticks = threading.RLock(), threading.Event(), 0
         self._thread: threading.Thread | None = None
         self.boats: dict[str, Boat] = {}
-        self._ports = Ports(allow_remote)
+        self._ports = Ports(told.allow_remote)
         self._hub: PositionHub | None = None
-        config = game_of(boats, preset, rules or {})
-        parts = (autopilot or AutopilotSettings(), radio or RadioSettings())
-        setting = Setting(self.frame, *parts, noise, key, float(getattr(self.clock, "speed", 1.0)))
+        config = game_of(boats, told.preset, told.rules)
+        warp = float(getattr(self.clock, "speed", 1.0))
+        setting = Setting(self.frame, told.autopilot, told.radio, told.noise, told.key, warp)
         try:
-            places = start_places(boats, config, seed if random_start else None)
-            seeds = np.random.SeedSequence(seed).spawn(len(boats))
+            places = start_places(boats, config, told.seed if told.random_start else None)
+            seeds = np.random.SeedSequence(told.seed).spawn(len(boats))
             for i, (spec, place) in enumerate(zip(boats, places, strict=True)):
                 self.boats[spec.name] = boat = Boat(spec, place, spec.system_id or i + 1, setting, seeds[i])
                 self._ports.plug_in(boat)
-            if feed_to:
-                self._hub = PositionHub([near(to, allow_remote) for to in feed_to], self.frame, noise, key)
+            if told.feed_to:
+                listeners = [near(to, told.allow_remote) for to in told.feed_to]
+                self._hub = PositionHub(listeners, self.frame, told.noise, told.key)
             everyone = list(self.boats.values())
             players = [everyone[i] for i in playing(boats)]
             driven = {i: boat.spec.policy for i, boat in enumerate(players) if boat.spec.policy}
-            game = None if config is None else Game(config, driven, seed)
-            weather = Weather(water or Water(), self.frame, np.random.default_rng([seed, 0x9057]))
-            radius_m = separation_m if record else None
-            self._world = World(everyone, weather, game, players, self._hub, waits, radius_m)
+            game = None if config is None else Game(config, driven, told.seed)
+            weather = Weather(told.water, self.frame, np.random.default_rng([told.seed, 0x9057]))
+            radius_m = told.separation_m if told.record else None
+            self._world = World(everyone, weather, game, players, self._hub, told.waits, radius_m)
         except BaseException:
             self.close()
             raise
@@ -176,7 +189,7 @@ class SimFleet:
             fleet: the file, read or to be read.
             opponents: scripted policy of the boats of the game that the file's runner does not command.
             hulls: what a boat, by its name and its platform of the file, really is; None: what the file says.
-            **settings: of `SimFleet`, beside or instead of what the file says.
+            **settings: of `SimSettings`, beside or instead of what the file says.
 
         Raises:
             FleetFileError: the file cannot be used.

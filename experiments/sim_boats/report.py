@@ -57,7 +57,6 @@ def content_of(fleet: SimFleet, team: int) -> dict[str, Any]:
         "captures": None if fleet.truth is None else fleet.truth.captures,
         "tags": None if fleet.truth is None else fleet.truth.tags,
         "breaches": breaches,
-        "clean": breaches is not None and not any(map(_counts, breaches)),
     }
 
 
@@ -77,11 +76,6 @@ def verdicts_table(content: dict[str, Any]) -> Group:
     counted = Counter((when[breach["after_run"]], breach["kind"], breach["verdict"]) for breach in content["breaches"])
     rows = [[*what, str(number)] for what, number in sorted(counted.items())]
     return titled("Breaches of the own team", ["", "with", "verdict", "number"], rows or [["none", "", "", "0"]])
-
-
-def _counts(breach: dict[str, Any]) -> bool:
-    """Whether a shield should have prevented it; once the run is over there is none."""
-    return not breach["after_run"] and (breach["kind"] == "teammate" or breach["verdict"] == "avoidable")
 
 
 def _boat(fleet: SimFleet, name: str) -> dict[str, Any]:

@@ -23,6 +23,7 @@ from .fleet_file import FleetFile
 from .messages import (
     Action,
     Alarming,
+    Answer,
     BoatReading,
     ContactSource,
     Link,
@@ -151,22 +152,7 @@ class ControlLoop:
         self.tracker.margin_m = self.model_error.margin_m
         answer = parts.policy.latest()
         game, game_age = (None, math.inf) if parts.game is None else (parts.game.game(), parts.game.game_age_s())
-        heard = [alarm for source in parts.contacts if isinstance(source, Alarming) for alarm in source.alarms()]
-        verdict = self.failsafe.judge(
-            Seen(
-                now_s=began,
-                readings=readings,
-                answer=answer,
-                game_age_s=game_age,
-                game_expected=self._has_referee,
-                game_over=game is not None and game.over,
-                log_fault=self._log_fault,
-                overrides=self.operator.active(began),
-                alarms=(*self.tracker.alarms(), *heard),
-                outside_model_s={name: self.model_error.outside_s(name) for name in readings},
-                decided=self._decided,
-            )
-        )
+        verdict = self._judge(began, readings, answer, game, game_age)
         self._retake(verdict, began)
         steered = self._steer(answer.commands, verdict, game, game_age)
         self._decided = steered.decisions
@@ -200,6 +186,27 @@ class ControlLoop:
         self._record(tick)
         parts.policy.offer(Snapshot(tick.number, began, self.tracker.seen_now(), tick.game, game_age))
         return tick
+
+    def _judge(
+        self, now_s: float, readings: Mapping[str, BoatReading], answer: Answer, game: GameState | None, age_s: float
+    ) -> Verdict:
+        """What is due by the table of fail-safes; ``age_s``: of the state of the game."""
+        heard = [alarm for source in self.parts.contacts if isinstance(source, Alarming) for alarm in source.alarms()]
+        return self.failsafe.judge(
+            Seen(
+                now_s=now_s,
+                readings=readings,
+                answer=answer,
+                game_age_s=age_s,
+                game_expected=self._has_referee,
+                game_over=game is not None and game.over,
+                log_fault=self._log_fault,
+                overrides=self.operator.active(now_s),
+                alarms=(*self.tracker.alarms(), *heard),
+                outside_model_s={name: self.model_error.outside_s(name) for name in readings},
+                decided=self._decided,
+            )
+        )
 
     def _steer(self, answer: Commands | None, verdict: Verdict, game: GameState | None, game_age_s: float) -> Steered:
         if self._ending:

@@ -39,13 +39,14 @@ class HelmGate:
 
     Attributes:
         inputs, outputs: variables read and written.
+        prefix: as given.
     """
 
     outputs = ("DESIRED_HEADING", "DESIRED_SPEED")
 
     def __init__(self, frame: FieldFrame, prefix: str = "RAW_") -> None:
         self.inputs = tuple(f"{prefix}{name}" for name in self.outputs)
-        self._frame = frame
+        self.prefix, self._frame = prefix, frame
         self._heard: dict[str, tuple[float, float]] = {}
 
     def hear(self, message: Message, now_s: float) -> None:

@@ -40,11 +40,11 @@ class MoosLinks(LinkMaker):
         host, port = address_of(settings.address.removeprefix(MOOS), f"boat {boat.name!r}: link")
         frame = self._fleet.frame
         gate = HelmGate(frame, settings.prefix)
-        corner_m, prefix = settings.corner_m, settings.prefix
+        corner_m = settings.corner_m
         error_m = self._fleet.shield_config.position_error_m
         contacts = self.contacts.setdefault(corner_m, MoosContacts(frame, corner_m, self._fleet.names, error_m))
         place = (boat.name, host.strip("[]"), port)
-        return MoosLink(*place, gate, frame, self._clock, contacts, corner_m=corner_m, prefix=prefix)
+        return MoosLink(*place, gate, frame, self._clock, contacts, corner_m=corner_m)
 
     def sources(self) -> tuple[MoosContacts, ...]:
         """Who tells of other boats."""

@@ -56,7 +56,6 @@ class MoosLink(Link):
         clock: the loop's; as many times faster than real time as the community's MOOSTimeWarp says.
         contacts: takes the NODE_REPORTs that reach this boat.
         corner_m: the field's corner on the boat's local grid, m.
-        prefix: what the helm puts before its own DESIRED_*, for words.
     """
 
     def __init__(
@@ -70,13 +69,12 @@ class MoosLink(Link):
         contacts: MoosContacts,
         *,
         corner_m: tuple[float, float] = (0.0, 0.0),
-        prefix: str = "RAW_",
     ) -> None:
         self.boat, self.gate = boat, gate
         self._clock, self._contacts = clock, contacts
         self._lock = threading.Lock()
         self._navigation = Navigation(frame, corner_m)
-        self._drivers = Drivers(client_name(boat), gate.outputs, prefix)
+        self._drivers = Drivers(client_name(boat), gate.outputs, gate.prefix)
         self._faults: Counter[str] = Counter()
         self._texts: deque[str] = deque(maxlen=MOST_TEXTS)
         self._told_fault = ""

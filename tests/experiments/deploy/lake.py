@@ -1,11 +1,10 @@
 """Two simulated boats behind sockets, their links and the loop, all on one clock moved by hand."""
 
-import contextlib
 import math
-import threading
 import time
 
 import numpy as np
+from made_ticks import repeating
 from steerclear.experiments.deploy.demo import free_ports
 from steerclear.experiments.sim_boats import AutopilotSettings, SimBoat, SimFleet
 from steerclear.shield import Commands
@@ -70,7 +69,7 @@ class Lake:
         self.station = VehicleSession(load_fleet(folder / "FLEET.yaml"), None, self.clock)
 
     def __enter__(self):
-        with self._living():
+        with repeating(self.move, 0.0):
             self.station.connect(30.0)
             self.station.prepare(60.0)
         fleet, sinks = self.station.fleet, [self]
@@ -85,7 +84,7 @@ class Lake:
         return self
 
     def __exit__(self, *_):
-        with self._living():
+        with repeating(self.move, 0.0):
             self.station.close()
         self.water.close()
         if self.boxed:
@@ -113,20 +112,3 @@ class Lake:
             self.move()
         first, second = (state[[L.X, L.Y]] for state in self.water.states().values())
         return float(np.hypot(*(first - second)))
-
-    @contextlib.contextmanager
-    def _living(self):
-        """Boats live in a thread meanwhile."""
-        done = threading.Event()
-
-        def live():
-            while not done.is_set():
-                self.move()
-
-        thread = threading.Thread(target=live)
-        thread.start()
-        try:
-            yield
-        finally:
-            done.set()
-            thread.join()

@@ -1,6 +1,8 @@
 """Ticks of a simulated game, as the loop on boats would make them, and one put together by hand."""
 
+import contextlib
 import math
+import threading
 import time
 
 import numpy as np
@@ -107,3 +109,21 @@ def wait_for(condition, patience_s=30.0):
     while not condition():
         assert time.monotonic() < end_s
         time.sleep(0.005)
+
+
+@contextlib.contextmanager
+def repeating(act, every_s=0.02):
+    """Do something again and again in a thread of its own, until it is left."""
+    done = threading.Event()
+
+    def run():
+        while not done.wait(every_s):
+            act()
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    try:
+        yield
+    finally:
+        done.set()
+        thread.join()

@@ -3,10 +3,10 @@
 import contextlib
 import json
 import socket
-import threading
 
 import pytest
 from json_keys import KEYS, undocumented
+from made_ticks import repeating
 from steerclear.env.core import BatchedMctf
 from steerclear.experiments.cli import app
 from steerclear.experiments.deploy.demo import free_ports
@@ -21,7 +21,6 @@ from steerclear.shield.bridge.blackbox import LogReader, log_path
 from steerclear.shield.bridge.control_loop import Timing
 from steerclear.shield.bridge.feed import FeedSender
 from steerclear.shield.bridge.fleet_file import load_fleet
-from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.preflight_checks import CheckResult
 from steerclear.shield.bridge.session import VehicleSession
 from steerclear.shield.exceptions import ConfigError, FleetFileError, LinkError, PolicyError
@@ -77,20 +76,9 @@ BUSY = ("latency", "rates", "spread", "course", "response")
 @contextlib.contextmanager
 def referee(fleet):
     """Says all the time that both flags are home."""
-    state, done = state_of(BatchedMctf(game_config(fleet)), player_names(fleet)), threading.Event()
-
-    def tell():
-        with FeedSender("referee", fleet.feed_listeners()) as sender:
-            while not done.wait(0.02):
-                sender.send_game(state)
-
-    thread = threading.Thread(target=tell)
-    thread.start()
-    try:
+    state = state_of(BatchedMctf(game_config(fleet)), player_names(fleet))
+    with FeedSender("referee", fleet.feed_listeners()) as sender, repeating(lambda: sender.send_game(state)):
         yield
-    finally:
-        done.set()
-        thread.join()
 
 
 def test_a_run_on_simulated_boats_from_preflight_to_stopped(fleet_file, boats, entry):
@@ -128,13 +116,6 @@ def test_deploy_refuses_to_start_without_its_preflight_and_moves_nothing(fleet_f
     assert outcome.log is None
     assert "left alone" in outcome.left[0]
     assert boats.states()["blue_1"][:2] == pytest.approx(before)
-
-
-def test_an_operator_ends_it_before_boats_move(fleet_file, boats, entry):
-    operator = Operator()
-    operator.end("test")
-    outcome = deploy(orders_of(fleet_file, entry, accept=("drill", *BUSY)), operator=operator)
-    assert outcome.log is None
 
 
 def taken(path, kind):
@@ -368,8 +349,3 @@ def test_a_file_with_nothing_to_command_says_why(fleet_file, old, new, said):
     fleet_file.write_text(text if "commanded" in new else text.replace("agent: agent_1, ", ""))
     with pytest.raises(FleetFileError, match=said):
         read_fleet(orders_of(fleet_file))
-
-
-def test_the_kept_preflight_is_json(fleet_file):
-    path = keep(load_fleet(fleet_file), "x", None, [good("response", delay_s=float("nan"))], [])
-    assert json.loads(path.read_text())["checks"][0]["figures"] == {}
