@@ -11,7 +11,6 @@ from steerclear.experiments.sim_boats.demo import demo_fleet
 from steerclear.shield.bridge.clock import ManualClock
 from steerclear.shield.bridge.failsafe_table import DISABLES
 from steerclear.shield.bridge.operator import Operator
-from steerclear.shield.exceptions import ConfigError
 
 
 @pytest.fixture
@@ -101,21 +100,6 @@ def test_an_override_says_what_it_disables_and_for_how_long(controls):
     assert made.menu() == []
     (entry,) = operator.active(7.0)
     assert (entry.condition, entry.subject, entry.until_s, entry.by) == ("contact", "red_1", 37.0, "keyboard")
-
-
-@pytest.mark.parametrize("key", ["t", " r", "o"])
-def test_what_was_said_in_one_menu_is_not_said_in_the_next(controls, monkeypatch, key):
-    made, operator, press = controls
-
-    def refuse(*_):
-        raise ConfigError("an override of nothing")
-
-    monkeypatch.setattr(operator, "override", refuse)
-    press("o111")
-    assert made.menu()[-1] == "an override of nothing"
-    press("\x1b" + key)
-    assert made.menu()
-    assert "an override of nothing" not in made.menu()
 
 
 def test_wrong_keys_leave_the_menu_and_change_nothing_and_q_ends_the_run(controls):

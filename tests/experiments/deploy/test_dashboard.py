@@ -15,7 +15,7 @@ from made_ticks import Stream, made_tick, wait_for
 from rich.console import Console
 from steerclear.experiments.deploy import dashboard as dashboard_module
 from steerclear.experiments.deploy.dashboard import Dashboard
-from steerclear.experiments.deploy.dashboard_map import Canvas, FieldMap
+from steerclear.experiments.deploy.dashboard_map import FieldMap
 from steerclear.experiments.deploy.dashboard_view import WHY, Moment, View, approaches, boats_table, dashboard_page
 from steerclear.experiments.sim_boats.demo import demo_fleet
 from steerclear.experiments.terminal import SafeConsole
@@ -156,19 +156,6 @@ def test_closest_approaches_of_crossing_and_parting_boats():
     assert found(1, [0]) == {}
 
 
-def test_the_canvas_keeps_shapes_and_scale():
-    canvas = Canvas(10, 5, (0.0, 0.0, 19.0, 19.0))
-    canvas.line((0.0, 0.0), (19.0, 19.0), "red")
-    canvas.label((9.0, 9.0), "here it is", "bold")
-    canvas.line((-50.0, 3.0), (50.0, math.pi), "dim")
-    canvas.circle((1e6, 1e6), 3.0, "dim")
-    lines = [line.plain for line in canvas.lines()]
-    assert [len(line) for line in lines] == [10] * 5
-    assert lines[0][9] == "⠊", "one dot per metre up to the far corner"
-    assert "here it is" in lines
-    assert all("⠀" <= letter <= "⣿" for letter in lines[0])
-
-
 def cell_of(lines, name, title):
     """What stands in a boat's row under a head; the table may stand beside the map."""
     heads = next(line for line in lines if "nominal" in line and "margin" in line)
@@ -182,17 +169,6 @@ def test_what_was_wanted_and_sent_is_shown_whole(columns, rows):
     lines = shown(demo_fleet(), Moment(made_tick(demo_fleet()), 5.0), columns, rows)
     cells = [[cell_of(lines, f"blue_{k}", title) for k in (1, 2, 3)] for title in ("nominal", "filtered")]
     assert cells == [["1.5 054°", "12.5 359°", "2.0 180°"], ["1.5 054°", "10.2 008°", "0.0 271°"]]
-
-
-def test_a_wide_terminal_shows_more():
-    tick = made_tick(demo_fleet())
-    narrow, wide = (shown(demo_fleet(), Moment(tick, 5.0), *size) for size in ((80, 24), (160, 45)))
-    assert "constraint" not in "".join(narrow)
-    heads = next(line for line in wide if "constraint" in line)
-    row = next(line for line in wide if "12.5 359°" in line)
-    assert row[heads.index("constraint") :].startswith("red_3"), "what binds"
-    assert "…" not in row[heads.index("boat") :]
-    assert any("error 0.3 m" in line for line in wide)
 
 
 @pytest.mark.parametrize("width", [1, 10, 30, 45, 60, 80, 99, 160, 400])

@@ -17,7 +17,7 @@ from made_ticks import Stream
 from rich.console import Console
 from steerclear.experiments.cli_boats import show_check
 from steerclear.experiments.deploy.keys import FIGURES, figure_rows
-from steerclear.experiments.deploy.plain import PlainLines, Tally, closest_m
+from steerclear.experiments.deploy.plain import PlainLines, Tally
 from steerclear.experiments.deploy.quiet import (
     LOOP_FIRST,
     OTHERS_FIRST,
@@ -25,9 +25,8 @@ from steerclear.experiments.deploy.quiet import (
     ended_by_signals,
     logging_aside,
     undisturbed,
-    warm_up,
 )
-from steerclear.shield import Commands, Shield, ShieldConfig, decide
+from steerclear.shield import Commands, Shield, ShieldConfig
 from steerclear.shield.bridge.messages import Action
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.preflight_checks import CheckResult
@@ -50,17 +49,6 @@ def said_of(ticks, every_s=0.3):
         time.sleep(0.01)
     sink.close()
     return lines
-
-
-def test_a_line_counts_all_that_happened_since_the_last_one(ticks):
-    action = Action("red_1", "contact", "slow", "red_1 old")
-    lines = said_of([*ticks[:-1], dataclasses.replace(ticks[-1], actions=(action,))])
-    commands = sum(int(tick.fleet.controlled.sum()) for tick in ticks)
-    changed = sum(tick.decisions.count_intervened for tick in ticks)
-    closest = min(closest_m(tick.fleet) for tick in ticks)
-    assert f"closest {closest:5.1f} m, {changed} of {commands} commands changed" in lines[0]
-    assert len(ticks) > 1 < commands
-    assert "red_1 old" in lines[1]
 
 
 def test_a_boat_alone_has_no_closest_approach(ticks):
@@ -108,15 +96,6 @@ def test_a_check_that_was_accepted_beforehand_does_not_read_as_a_failure(passed,
     show_check(Console(file=stream, width=80), CheckResult("drill:blue_1", passed, "42 [s] ago"), accepted)
     assert stream.getvalue().split("drill:blue_1")[0].strip() == mark
     assert "drill:blue_1: 42 [s] ago" in stream.getvalue()
-
-
-def test_every_stage_of_a_decision_runs_before_boats_move(fleet_of, monkeypatch):
-    seen, stages = set(), {"begin", "begin_group", "linearise", "accept", "end_group", "end"}
-    for name in stages:
-        stage = getattr(decide, name)
-        monkeypatch.setattr(decide, name, lambda *values, name=name, stage=stage: (seen.add(name), stage(*values))[1])
-    warm_up(fleet_of(2).with_shield(position_error_m=0.3, delay_s=0.1, solver="daqp"))
-    assert seen == stages
 
 
 def test_logs_go_to_the_file_and_an_empty_one_is_not_left(tmp_path):

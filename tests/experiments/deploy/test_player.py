@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-import pickle
 import re
 from pathlib import Path
 
@@ -11,7 +10,7 @@ import pytest
 from steerclear import policies
 from steerclear.env.mctf import MctfEnv
 from steerclear.experiments.deploy.orders import rehearse
-from steerclear.experiments.deploy.player import NEED_NO_GAME, Observer, Orders, Player, cast_of, load_player
+from steerclear.experiments.deploy.player import NEED_NO_GAME, Observer, Orders, cast_of, load_player
 from steerclear.experiments.deploy.rules import game_config, game_obstacles
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.bridge.messages import Snapshot
@@ -84,14 +83,6 @@ def test_commands_are_absolute_and_for_all_boats_of_the_file(fleet_of, snapshot_
         assert (play.commands[:3, 1] < 2.0 * math.pi).all()
 
 
-def test_more_than_top_speed_is_top_speed_on_boats(fleet_of, snapshot_of, write_entry):
-    player = load_player(Orders(cast_of(fleet_of(1)), write_entry("return (5.0, 10.0)")))
-    env = MctfEnv(game_config(fleet_of(1)))
-    play = player.play(snapshot_of(env, fleet_of(1)))
-    assert play.relative[0].tolist() == [5.0, 10.0]
-    assert play.commands[0, 0] == 2.0
-
-
 @pytest.mark.parametrize(
     ("body", "words"),
     [
@@ -121,19 +112,6 @@ def test_a_boat_without_a_usable_answer_has_no_command_and_the_others_have(
     env.core.is_tagged[0, 1] = True
     tagged = player.play(snapshot_of(env, fleet, 1))
     assert np.isfinite(tagged.commands[1]).all(), "the game drives a tagged boat home whatever its policy does"
-
-
-def test_what_a_policy_object_raises_is_a_problem_of_its_boats(fleet_of, snapshot_of):
-    player = load_player(Orders(cast_of(fleet_of(1)), "hold"))
-    env = MctfEnv(game_config(fleet_of(1)))
-
-    def fail(observations, infos):
-        raise RuntimeError("out of\nideas")
-
-    player.policy.act = fail
-    play = player.play(snapshot_of(env, fleet_of(1)))
-    assert play.problems == ("blue_1: raised RuntimeError: out of ideas",)
-    assert np.isnan(play.commands).all()
 
 
 def test_a_game_that_starts_again_is_a_new_game_for_the_policy(fleet_of, snapshot_of, write_entry):
@@ -190,15 +168,6 @@ def test_the_flag_goes_with_the_boat_that_carries_it(fleet_of, snapshot_of):
     assert observer.env.core.flag_position[0, 1].tolist() == [50.0, 30.0]
 
 
-def test_one_boat_of_a_team_can_be_played_alone(fleet_of, snapshot_of):
-    fleet = fleet_of()
-    cast = cast_of(fleet, ["blue_2"])
-    assert cast.ours == ("agent_1",)
-    play = Player(Orders(pickle.loads(pickle.dumps(cast)), "medium")).play(snapshot_of(MctfEnv(cast.config), fleet))
-    assert np.isfinite(play.commands[1]).all()
-    assert np.isnan(play.commands[[0, 2, 3, 4, 5, 6]]).all()
-
-
 @pytest.mark.parametrize(
     ("policy", "words"),
     [("mediun", "did you mean medium"), ("no/such/file.zip", "no/such/file.zip"), ("keyboard", "keyboard")],
@@ -206,12 +175,6 @@ def test_one_boat_of_a_team_can_be_played_alone(fleet_of, snapshot_of):
 def test_policies_that_cannot_play_are_refused_when_loaded(fleet_of, policy, words):
     with pytest.raises(PolicyError, match=words):
         load_player(Orders(cast_of(fleet_of()), policy))
-
-
-@pytest.mark.parametrize("start", ["raise MemoryError", "import sys; sys.exit(2)", "1 / 0"])
-def test_a_policy_that_cannot_be_built_is_refused_with_its_reason(fleet_of, write_entry, start):
-    with pytest.raises(PolicyError, match="cannot be built"):
-        load_player(Orders(cast_of(fleet_of()), write_entry("return 4", start=start)))
 
 
 @pytest.mark.parametrize(

@@ -1,13 +1,10 @@
 """The sea trial's manoeuvres on a boat without sockets: all are driven, inside the geofence, and can be fitted."""
 
 import math
-import shlex
 import types
-from pathlib import Path
 
 import numpy as np
 import pytest
-from steerclear.experiments.cli_boats import next_words
 from steerclear.experiments.deploy.sea_trial import MANOEUVRES, SeaTrial, longest_s
 from steerclear.experiments.fit.runs import NEEDED, Streams, untold
 from steerclear.shield.bridge.fleet_file import parse_fleet
@@ -59,12 +56,6 @@ def test_every_manoeuvre_is_driven_inside_the_geofence(platform):
     assert len(rows) * 0.1 < 15 * 60.0
 
 
-def test_what_to_type_next_is_one_command_in_any_folder():
-    words = next_words(Path("/my boat/logs/a.mcap"), "blue_1").removeprefix("next: ")
-    asked = ["steerclear", "fit", "/my boat/logs/a.mcap", "--boat", "blue_1", "--out", "blue_1.yaml"]
-    assert shlex.split(words) == asked
-
-
 def test_the_trial_shows_turns_and_stops_of_both_sides():
     _, _, rows = driven("ardurover_boat")
     turn = np.diff(np.unwrap(rows[:, 3], period=360.0)) / 0.1
@@ -77,13 +68,6 @@ def test_the_trial_shows_turns_and_stops_of_both_sides():
             log.add(what, time_s, value)
     runs = log.runs(NEEDED)
     assert sum(run.seconds for run in runs) > 120.0
-
-
-def test_boats_are_driven_one_after_the_other():
-    trial, told, _ = driven("ardurover_boat", ("one", "two"))
-    assert trial.done
-    owners = [text.partition(": ")[0] for text in told]
-    assert owners == ["one"] * len(MANOEUVRES) + ["two"] * len(MANOEUVRES)
 
 
 def test_commands_the_shield_changed_are_counted():

@@ -49,16 +49,6 @@ def test_tracks_are_what_was_seen(run):
         assert np.isnan(tracks.wanted[k, 2:]).all()  # nobody knows what opponents wanted
 
 
-def test_ages_put_a_boat_back_to_where_it_was_then(run):
-    header, ticks, tracks = run
-    aged = [
-        dataclasses.replace(t, fleet=dataclasses.replace(t.fleet, age_s=np.array([0.0, 0.0, 0.3, 0.0]))) for t in ticks
-    ]
-    late = tracks_of(aged, header)
-    assert late.states[50, 2, :4] == pytest.approx(tracks.states[53, 2, :4], abs=1e-6)
-    assert late.states[50, 0, :4] == pytest.approx(tracks.states[50, 0, :4], abs=1e-6)
-
-
 def test_a_boat_nothing_was_heard_of_is_not_there(run):
     header, ticks, _ = run
     found = [_alone(tick) if 60 <= tick.number < 120 else tick for tick in ticks]

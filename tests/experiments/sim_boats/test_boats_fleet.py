@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from boat_links import READY, station
-from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from steerclear.experiments.sim_boats import RadioSettings, SimBoat, SimFleet
 from steerclear.experiments.sim_boats.faults import faults_page
@@ -46,37 +45,6 @@ def test_boats_behind_every_kind_of_link(kind):
         assert ground.of("HEARTBEAT", 9)[-1].custom_mode == 15
         assert len(ground.of("GLOBAL_POSITION_INT", 9)) > 30
         assert fleet.states()["b"][L.SPEED] > 0.3
-
-
-def test_a_boat_that_dials_finds_a_server_that_comes_later():
-    port = free_port(socket.SOCK_STREAM)
-    fleet = SimFleet([SimBoat("b", address=f"tcpin:{HERE}:{port}")], autopilot=READY)
-    fleet.advance(0.2)
-    server = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-    try:
-        server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        server.bind((HERE, port))
-        server.listen(1)
-        server.settimeout(5.0)
-        deadline = time.monotonic() + 10.0
-        data = b""
-        server.setblocking(False)
-        peer = None
-        while len(data) < 20 and time.monotonic() < deadline:
-            fleet.advance(1.0)
-            time.sleep(0.05)
-            try:
-                peer = peer or server.accept()[0]
-                peer.settimeout(0.1)
-                data += peer.recv(4096)
-            except (BlockingIOError, TimeoutError):
-                continue
-        assert data[0] == 0xFD
-    finally:
-        if peer is not None:
-            peer.close()
-        server.close()
-        fleet.close()
 
 
 def test_boats_share_a_port_and_hear_only_what_is_for_them():
@@ -137,22 +105,6 @@ def test_any_bytes_are_survived():
         assert fleet.states()["b"][L.SPEED] > 0.3
 
 
-def test_two_boats_of_one_id_on_a_port_are_refused():
-    address = f"udpout:{HERE}:{free_port()}"
-    boats = [SimBoat("a", address=address, system_id=3), SimBoat("b", address=address, system_id=3)]
-    with pytest.raises(ConfigError, match="system id 3"):
-        SimFleet(boats)
-    again = SimFleet([SimBoat("a", address=address)])  # the port was given back
-    again.close()
-
-
-def test_a_taken_port_is_one_clear_error():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
-        other.bind((HERE, 0))
-        with pytest.raises(ConfigError, match="give another port"):
-            SimFleet([SimBoat("a", address=f"udpout:{HERE}:{other.getsockname()[1]}")])
-
-
 def test_the_same_seed_gives_the_same_sensors():
     def seen(seed):
         with alone(noise=1.0, seed=seed, radio=RadioSettings(loss=0.3)) as _:
@@ -180,22 +132,6 @@ def test_lives_by_its_clock_in_a_thread():
     assert wall_s >= 0.9
     assert fleet.cpu_s > 0.0
     fleet.close()  # again
-
-
-def test_loss_and_delay_of_the_radio():
-    fleet = alone(radio=RadioSettings(loss=0.4, delay_s=0.3))
-    with station(fleet) as ground:
-        for _ in range(40):
-            ground.call()
-            ground.guide(1)
-            ground.run(0.1)
-        ground.heard.clear()
-        ground.run(20.0)
-        told = ground.positions(1)
-        assert 0.45 * 400 < len(told) < 0.75 * 400
-        assert fleet.boats["b"].down.lost > 100
-        assert fleet.boats["b"].up.lost > 20
-        assert told[-1][0] == pytest.approx(fleet.time_s - 0.3, abs=0.5)
 
 
 def times(places):
@@ -290,31 +226,3 @@ def test_faults_that_do_not_exist_are_refused(boat, kind, options, match):
             fleet.fault(boat, kind, **options)
     finally:
         fleet.close()
-
-
-def test_a_boat_can_be_put_somewhere():
-    fleet = alone()
-    try:
-        fleet.place("b", 20.0, 5.0, 90.0, 1.0)
-        fleet.advance(0.1)
-        x, y, heading, speed = fleet.states()["b"][:4]
-        assert (x, y, heading) == pytest.approx((20.1, 5.0, 90.0), abs=0.05)
-        assert speed == pytest.approx(1.0, abs=0.2)
-    finally:
-        fleet.close()
-
-
-def test_boats_read_their_clocks_between_ticks():
-    with alone() as fleet:
-        link = mavutil.mavlink_connection(fleet.addresses["b"], dialect="ardupilotmega", source_system=255)
-        try:
-            told = []
-            for i in range(20):
-                link.mav.timesync_send(0, 1000 + i)
-                answer = link.recv_match(type="TIMESYNC", blocking=True, timeout=5.0)
-                told.append(answer.tc1)
-                time.sleep(0.003)
-        finally:
-            link.close()
-    assert told == sorted(told)
-    assert any(nanoseconds % 20_000_000 for nanoseconds in told)

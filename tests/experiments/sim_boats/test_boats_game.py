@@ -12,7 +12,6 @@ from steerclear.experiments.sim_boats import SimBoat, SimFleet
 from steerclear.experiments.sim_boats.game import start_places
 from steerclear.shield.bridge.feed_packets import parse_packet
 from steerclear.shield.bridge.frame import FieldFrame
-from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import layout as L
 
 
@@ -60,17 +59,6 @@ def test_policies_wait_until_every_link_is_commanded():
         assert fleet.states()["red"][L.SPEED] > 0.1
 
 
-def test_play_begins_when_told():
-    boats = [SimBoat("blue"), SimBoat("red", team=1, address=None, policy="medium_attack")]
-    fleet = SimFleet(boats, autopilot=READY)
-    try:
-        fleet.play()
-        fleet.advance(2.0)
-        assert fleet.states()["red"][L.SPEED] > 0.1
-    finally:
-        fleet.close()
-
-
 def test_the_record_is_a_games_and_the_oracle_judges_it(tmp_path):
     fleet = six(record=True)
     try:
@@ -91,16 +79,6 @@ def test_the_record_is_a_games_and_the_oracle_judges_it(tmp_path):
         judged = fleet.judge(0)
         assert len(judged) == sum(min(row[1], row[2]) < 3 for row in inside) > 0
         assert {entry["verdict"] for entry in judged} <= {"avoidable", "unavoidable", "started_inside"}
-    finally:
-        fleet.close()
-
-
-def test_what_was_not_recorded_cannot_be_had():
-    fleet = six()
-    try:
-        fleet.advance(0.2)
-        with pytest.raises(ConfigError, match="record=True"):
-            fleet.truth_record()
     finally:
         fleet.close()
 
@@ -207,9 +185,3 @@ def test_a_policys_boat_with_a_link_tells_where_it_is_and_obeys_who_commands_it(
         assert math.dist(told[0][1:], told[-1][1:]) > 1.0  # its policy drives it while nobody commands
         ground.run(12.0, lambda: ground.steer(2, 0.0, 0.5))
         assert fleet.states()["red"][L.HEADING] == pytest.approx(0.0, abs=5.0)
-
-
-def test_the_feed_stays_on_this_machine():
-    with pytest.raises(ConfigError, match="not on this machine"):
-        SimFleet([SimBoat("b")], feed_to=["10.1.2.3:14700"])
-    SimFleet([SimBoat("b")], feed_to=["0.0.0.0:14700"]).close()

@@ -7,7 +7,7 @@ from json_keys import KEYS, undocumented
 from steerclear.env.record import load
 from steerclear.experiments.cli import app
 from steerclear.experiments.sim_boats import SimFleet
-from steerclear.experiments.sim_boats.demo import demo_fleet, demo_text
+from steerclear.experiments.sim_boats.demo import demo_text
 from steerclear.experiments.sim_boats.faults import Incident, parse_incident
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.exceptions import ConfigError
@@ -39,13 +39,6 @@ def fleet_path(tmp_path):
     return path
 
 
-def test_demo_fleet_is_three_against_three():
-    fleet = demo_fleet()
-    assert len(fleet.boats) == 6
-    assert {boat.name for boat in fleet.commanded()} == {"blue_1", "blue_2", "blue_3"}
-    assert {platform.name for platform in fleet.platform_of.values()} == {"heron"}
-
-
 def test_a_fleet_from_its_file(fleet_path, tmp_path):
     key = tmp_path / "boats.key"
     key.write_text("ab" * 32)
@@ -62,15 +55,6 @@ def test_a_fleet_from_its_file(fleet_path, tmp_path):
         fleet.close()
 
 
-def test_a_key_others_can_read_is_refused(fleet_path, tmp_path):
-    key = tmp_path / "boats.key"
-    key.write_text("ab" * 32)
-    key.chmod(0o644)
-    text = fleet_path.read_text() + f"signing: {{key_file: {key}}}\n"
-    with pytest.raises(ConfigError, match="chmod"):
-        SimFleet.from_file(parse_fleet(text))
-
-
 def test_runs_and_writes_figures_and_record(fleet_path, tmp_path):
     figures, record = tmp_path / "run.json", tmp_path / "truth.npz"
     options = ["--no-wait", "--duration", "4", "--speed", "20", "--wind", "5@270", "--noise", "1", "--loss", "0.1"]
@@ -82,7 +66,6 @@ def test_runs_and_writes_figures_and_record(fleet_path, tmp_path):
     assert undocumented(content, KEYS["sim-boats"]) == []
     assert content["simulated_s"] >= 4.0
     assert content["played"]
-    assert content["clean"] == (not content["breaches"])
     assert len(content["closest"]) == 15
     assert len(load(record)["wanted"]) >= 35
     assert "blue_1: restart" in result.output

@@ -35,13 +35,6 @@ def test_an_override_says_what_it_disables_and_ends(caplog):
     assert "ended" in caplog.text
 
 
-def test_the_same_override_again_replaces_the_first():
-    operator = Operator()
-    operator.override("game", "", 30.0, 0.0)
-    operator.override("game", "", 60.0, 0.0)
-    assert [entry.until_s for entry in operator.active(1.0)] == [60.0]
-
-
 @pytest.mark.parametrize("seconds", [0.0, -1.0, LONGEST_OVERRIDE_S + 1.0, float("nan"), float("inf")])
 def test_no_override_without_an_end(seconds):
     with pytest.raises(ConfigError, match="at most"):

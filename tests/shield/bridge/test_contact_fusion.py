@@ -10,7 +10,7 @@ from steerclear.shield.bridge.failsafe import Failsafe, Seen
 from steerclear.shield.bridge.fleet_settings import ContactLimit
 from steerclear.shield.bridge.messages import Answer, BoatReading, Contact
 from steerclear.shield.bridge.operator import Override
-from steerclear.shield.bridge.tracker import MOST_SOURCES, MOST_STORIES, ContactFusion, Tracker
+from steerclear.shield.bridge.tracker import MOST_STORIES, ContactFusion, Tracker
 
 LIMIT = ContactLimit()
 
@@ -24,15 +24,6 @@ def seen(*contacts, now_s=100.0):
     for entry in contacts:
         assert sightings.take(entry, now_s) == ""
     return sightings
-
-
-def test_one_source_is_as_it_says():
-    view = seen(contact("hub")).view(100.0)
-    assert (view.contact, view.rivals, view.text, view.crowded) == (contact("hub"), (), "", False)
-
-
-def test_nobody_told_of_it():
-    assert ContactFusion(2.0, LIMIT.max_age_s, LIMIT.lost_after_s).view(0.0) is None
 
 
 @pytest.mark.parametrize("apart_m", [10.0, 30.0, 1000.0])
@@ -51,11 +42,6 @@ def test_bounds_that_exclude_each_other_are_covered_both(apart_m):
     told = view.contact
     for x, error_m in ((10.0, 0.2), (10.0 + apart_m, 0.2)):
         assert abs(x - told.position_m[0]) + error_m <= told.error_m + 1e-9
-
-
-def test_bounds_that_agree_cost_nothing():
-    view = seen(contact("hub", error_m=0.5), contact("link", 10.6, 100.0, error_m=0.3)).view(100.0)
-    assert view.contact.error_m in (0.3, 0.5)
 
 
 @pytest.mark.parametrize("off_m", [0.0, 5.0, 40.0, 900.0])
@@ -104,14 +90,6 @@ def test_each_source_is_checked_against_itself_alone():
     assert sightings.take(contact("hub", 10.0, 100.2), 100.2) == ""
     assert "no bound" in sightings.take(contact("x", error_m=math.inf), 100.0)
     assert "in the future" in sightings.take(contact("x", fixed_s=101.0), 100.0)
-
-
-def test_sources_without_end_do_not_fill_memory():
-    sightings = ContactFusion(2.0, LIMIT.max_age_s, LIMIT.lost_after_s)
-    for k in range(500):
-        sightings.take(contact(f"s{k}", fixed_s=100.0 + 0.01 * k), 110.0)
-    assert len(sightings._latest) <= MOST_SOURCES
-    assert len(sightings._gates) <= MOST_SOURCES
 
 
 def reading(now_s=100.0):

@@ -70,13 +70,6 @@ def test_every_changed_bit_is_found():
             assert seal.fault(bytes(changed)), (at, bit)
 
 
-def test_without_a_key_a_sealed_packet_is_refused_by_name():
-    with FeedReceiver("127.0.0.1:0", FRAME, ManualClock(100.0)) as receiver:
-        receiver.take(sealed(KEY, 1, fixes=(TRUE,)), LOCAL)
-        assert receiver.faults() == {"signed": 1}
-        assert "the file has no signing; give it the key" in receiver.fault_texts()["signed"]
-
-
 def test_keys_of_another_length_and_packets_that_leave_no_room_for_the_seal_are_refused():
     with pytest.raises(ConfigError, match="32"):
         FeedSender("hub", ["127.0.0.1:9"], b"short")

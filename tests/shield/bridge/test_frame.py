@@ -24,19 +24,6 @@ def test_headings_round_trip_and_agree_with_vectors(axis, heading):
     assert (x, y) == pytest.approx((math.sin(heading), math.cos(heading)), abs=1e-12)
 
 
-def test_north_of_an_unturned_field_is_its_y_axis():
-    # one minute of latitude is a nautical mile, to the earth's flattening
-    x, y = FieldFrame(45.0, 8.0).to_field_m(45.0 + 1 / 60, 8.0)
-    assert x == pytest.approx(0.0, abs=1e-6)
-    assert y == pytest.approx(1852.0, rel=2e-3)
-
-
-def test_a_field_along_the_east_has_its_y_axis_there():
-    frame = FieldFrame(45.0, 8.0, 90.0)
-    assert frame.turn_to_field(1.0, 0.0) == pytest.approx((0.0, 1.0), abs=1e-12)
-    assert frame.heading_to_true_rad(0.0) == pytest.approx(math.pi / 2)
-
-
 @pytest.mark.parametrize("place", [(90.0, 0.0, 0.0), (math.nan, 0.0, 0.0), (0.0, 181.0, 0.0), (0.0, 0.0, math.inf)])
 def test_impossible_places_are_refused(place):
     with pytest.raises(ConfigError, match="give"):

@@ -70,19 +70,10 @@ def test_who_comes_near_after_the_longest_time_is_told(caplog):
     assert "take it over by hand" in caplog.text
 
 
-def test_a_hunt_does_not_keep_the_run_longer_than_the_longest_time():
-    world = lying(("red_1", 40.0, 2.0, 0.0, 2.0))
-    assert ending(world) == pytest.approx(40.3, abs=0.5)
-
-
 def test_a_boat_at_rest_keeps_clear_of_a_long_hunt():
     world = lying(("red_1", 40.0, 2.0, 0.0, 2.0))
     ending(world)
     assert world.closest_m >= 2.5
-
-
-def test_on_quiet_water_boats_are_handed_over_at_once():
-    assert ending(lying(("red_1", 70.0, 20.0, 90.0, 0.0)), lambda world: False) < 1.0
 
 
 @pytest.mark.parametrize(

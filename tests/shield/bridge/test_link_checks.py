@@ -219,12 +219,6 @@ def test_what_is_no_reason_not_to_start(check, said, changes):
     assert found(check, replace(GOOD, **changes), said).passed
 
 
-def test_figures_and_words_of_a_good_link():
-    assert found(check_latency).figures["round_trip_median_s"] == pytest.approx(0.04)
-    assert found(check_spread, said=readings()).figures["spread_rms_m"] == pytest.approx(0.042, abs=0.01)
-    assert found(check_commanders).text.endswith("not signed")
-
-
 def test_what_was_refused_before_the_watch_is_not_of_it():
     said = [BoatReading("blue_1", 0.0, faults={"no_fix": 9}), *readings(1000)]
     (rates, *_) = run_checks(link_checks({"blue_1": FakeLink(said=said)}, {"blue_1": HERON}, ManualClock(10.0), 2.0))

@@ -109,17 +109,6 @@ def test_a_boat_that_stays_where_it_jumped_to_is_believed_in_the_end():
     assert world.last.fleet.state[0, L.X] == pytest.approx(world.links["blue_1"].row[L.X] + 30.0, abs=0.5)
 
 
-def test_telemetry_a_second_late_is_run_on_by_the_model():
-    more = "limits: {navigation: {max_age_s: 1.5, then: stop}}"
-    world = pair(more=more)
-    world.links["blue_1"].late_s = world.links["blue_2"].late_s = 1.0
-    world.run(8.0)
-    truth = np.array([link.row[:2] for link in world.links.values()])
-    believed = world.last.fleet.state[:, :2]
-    assert np.abs(truth - believed).max() < 0.6
-    assert world.run(12.0).closest_m >= 2.5
-
-
 @pytest.mark.parametrize("value", [math.nan, math.inf, 1e9])
 @pytest.mark.parametrize("field", ["position_m", "heading_rad", "speed_mps"])
 def test_impossible_telemetry_never_reaches_the_shield(field, value):
@@ -167,19 +156,6 @@ def test_an_override_of_a_lost_contact_leaves_it_out_and_says_so():
     assert ("contact", "stop") in world.responses("red_1")
 
 
-def test_a_link_that_comes_back_is_steered_again():
-    world = pair()
-    link = world.links["blue_1"]
-    world.run(2.0)
-    link.silent_since_s, link.deaf = world.clock.now_s(), True
-    world.run(6.0)
-    assert not world.last.fleet.controlled[0]
-    link.silent_since_s, link.deaf, link._silent = None, False, None
-    world.run(4.0)
-    assert world.last.fleet.controlled[0]
-    assert world.responses("blue_1") == set()
-
-
 def test_a_boat_in_another_mode_is_left_alone_and_kept_clear_of():
     world = pair()
     world.run(2.0)
@@ -193,14 +169,3 @@ def test_a_boat_in_another_mode_is_left_alone_and_kept_clear_of():
     assert ("mode", "none") in world.responses("blue_1")
     assert not world.last.sent["blue_1"].delivered
     assert world.closest_m >= 2.5
-
-
-def test_a_second_commander_is_answered_as_declared_and_told():
-    world = pair()
-    world.links["blue_1"].changed = {"faults": {"second_commander": 3}}
-    world.run(0.3)
-    world.links["blue_1"].changed = {}
-    world.run(1.0)
-    assert ("commander", "stop") in world.responses("blue_1")
-    world.run(3.0)
-    assert ("commander", "stop") not in world.responses("blue_1")

@@ -48,15 +48,6 @@ def test_a_boat_that_is_its_model_gets_no_margin():
     assert foresight.actions() == []
 
 
-@pytest.mark.parametrize("turns", [1, 19])
-def test_turns_that_were_left_out_are_no_fault_of_the_model(turns):
-    foresight, margins = drive(left_out=range(150, 150 + turns))
-    assert margins.max() == 0.0
-    assert foresight.quantile_m(NAME, 0, share=1.0) < 1e-6
-    assert foresight.quantile_m(NAME, 2) < 1e-6
-    assert foresight.outside_s(NAME) == 0.0
-
-
 def test_a_loop_that_falls_behind_every_second_still_finds_out_a_wrong_model():
     foresight, margins = drive(turn_share=0.5, left_out=range(5, 400, 10))
     assert margins[-1] == pytest.approx(min(foresight.quantile_m(NAME), 1.0), abs=0.05)
@@ -103,9 +94,3 @@ def test_a_boat_far_outside_its_model_is_counted_and_one_inside_is_forgiven():
     foresight, _ = drive(speed_share=0.3, limits={"outside_m": 0.5}, seconds=20.0)
     assert foresight.outside_s(NAME) > 5.0
     assert drive()[0].outside_s(NAME) == 0.0
-
-
-def test_old_telemetry_says_nothing_about_the_model():
-    foresight, margins = drive(turn_share=0.5, aged=lambda time_s: 2.0)
-    assert margins.max() == 0.0
-    assert foresight.quantile_m(NAME) == 0.0

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from bridge_fakes import FakeGame, World, fleet_of, game_of, straight
 from steerclear.shield import Surroundings
-from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.bridge.static_obstacles import StaticObstacles
 
 CIRCLE = (10.0, 20.0, 4.35)
@@ -86,19 +85,3 @@ def test_a_referee_who_falls_silent_lifts_the_circle_and_the_next_word_sets_it_a
         world.run(0.2)
         seen.append(world.last.surroundings.stops)
     assert seen == [(CIRCLE,), (), (CIRCLE,)]
-
-
-def test_the_files_own_limit_says_when_a_referee_is_silent():
-    file = parse_fleet(
-        """
-version: 1
-field: {origin: {latitude_deg: 42.0, longitude_deg: -71.0}, size_m: [80, 40]}
-geofence: {xmin_m: -20, ymin_m: -20, xmax_m: 100, ymax_m: 60}
-team: blue
-boats: [{name: a, team: blue, platform: heron, link: {kind: mavlink, address: "udpin:127.0.0.1:1", system_id: 1}}]
-limits: {game: {max_age_s: 0.5, then: stop}}
-"""
-    )
-    water = StaticObstacles(file, GROUNDS)
-    assert water.around(game_of(), 0.5).stops == (CIRCLE,)
-    assert water.around(game_of(), 0.6).stops == ()

@@ -50,10 +50,6 @@ def test_a_boat_never_seen_is_left_out_and_one_once_seen_stays():
     assert roster.assemble({"blue_1"}, without={"red_1"}).names == ("blue_1",)
 
 
-def test_no_boat_no_fleet():
-    assert roster_of().assemble({"blue_1"}) is None
-
-
 @pytest.mark.parametrize(
     ("bad", "said"),
     [

@@ -2,7 +2,6 @@
 
 import dataclasses
 import json
-import os
 import re
 import shutil
 from pathlib import Path
@@ -14,7 +13,7 @@ from hypothesis import strategies as st
 from logged_runs import Encounter, header_of
 from steerclear.shield.bridge.blackbox import LogReader, McapWriter
 from steerclear.shield.bridge.blackbox.format import tick_to_json
-from steerclear.shield.bridge.blackbox.hash_chain import Chain, ChainHead, Link
+from steerclear.shield.bridge.blackbox.hash_chain import Chain, ChainHead
 from steerclear.shield.exceptions import LogError
 
 quick = settings(max_examples=80, deadline=None, derandomize=True)
@@ -70,10 +69,6 @@ def test_every_record_is_under_a_link_and_the_last_says_how_many_there_are(log):
     assert [link["end"] for link in links[:-1]] == [""] * (len(links) - 1)
     head = json.loads(records[0].content["chain"])
     assert re.fullmatch(r"[0-9a-f]{64}", head["head"])
-
-
-def test_two_logs_begin_their_chains_differently():
-    assert ChainHead.new() != ChainHead.new()
 
 
 def at(records, topic, number):
@@ -137,11 +132,6 @@ def test_what_was_done_to_a_log_shows_in_words(log, tmp_path, name):
     assert chain.broken <= 3, "what is sound before and after is not blamed"
 
 
-def test_writing_a_log_anew_as_it_was_shows_nothing(log, tmp_path):
-    path = write_records(tmp_path / "copy.mcap", read_records(log))
-    assert check(path)[0].holds
-
-
 def test_a_link_where_the_change_is_names_it(log, tmp_path):
     records = read_records(log)
     k = at(records, "/tick", 10)
@@ -187,16 +177,6 @@ def test_a_log_that_was_killed_is_no_forgery(log, tmp_path_factory, share):
         assert share < 0.5, "cut off before its header"
 
 
-def test_a_chunk_that_is_damaged_shows_in_the_chain_too(log, tmp_path):
-    whole = bytearray(log.read_bytes())
-    whole[len(whole) // 2] ^= 0xFF
-    (tmp_path / "x.mcap").write_bytes(bytes(whole))
-    with LogReader(tmp_path / "x.mcap") as reader:
-        list(reader.ticks())
-    assert reader.damage
-    assert not reader.chain.holds
-
-
 def test_a_keyed_chain_is_checked_with_its_key_only(tmp_path, ticks):
     path = write(tmp_path / "run.mcap", ticks, key=KEY)
     chain, _ = check(path)
@@ -240,18 +220,6 @@ def test_a_header_without_a_sound_head_is_damaged(log, tmp_path, chain):
     path = write_records(tmp_path / "x.mcap", [records[0].with_content(chain=chain), *records[1:]])
     with pytest.raises(LogError, match="head of its chain"):
         LogReader(path)
-
-
-def test_a_link_is_what_it_says():
-    head = ChainHead(os.urandom(32).hex())
-    chain = Chain(head)
-    chain.add("/tick", (1, 2, 3), b"{}")
-    link = chain.next_link()
-    assert link == chain.next_link()
-    assert link.digest != chain.next_link("log").digest
-    assert Link.of(vars(link)) == link
-    with pytest.raises(LogError, match="damaged"):
-        Link.of({"count": "x"})
 
 
 def test_a_chain_that_was_taken_out_is_no_log(log, tmp_path):

@@ -80,28 +80,6 @@ def test_a_log_damaged_anywhere_gives_what_is_sound(log, data):
         assert tick.fleet.state.tobytes() == ticks[tick.number].fleet.state.tobytes()
 
 
-def test_a_log_without_its_index_is_read_to_the_end(log):
-    folder, _, whole = log
-    path = folder / "open.mcap"
-    path.write_bytes(whole[: whole.rindex(b"/tick") - 2000])
-    found, complete, _ = numbers(path)
-    assert found == list(range(STEPS))
-    assert not complete
-
-
-@pytest.mark.parametrize("content", [b"", b"\x89MCAP0\r\n", b"no log at all, but long enough to look at" * 10])
-def test_what_is_no_log_is_said(tmp_path, content):
-    path = tmp_path / "x.mcap"
-    path.write_bytes(content)
-    with pytest.raises(LogError, match="holds no header of a steerclear log"):
-        LogReader(path)
-
-
-def test_a_missing_log_is_said(tmp_path):
-    with pytest.raises(LogError, match="cannot open"):
-        LogReader(tmp_path / "none.mcap")
-
-
 def test_another_programs_log_is_said(tmp_path):
     from mcap.writer import Writer
 

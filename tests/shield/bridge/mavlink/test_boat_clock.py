@@ -50,20 +50,6 @@ def test_nothing_is_ever_younger_than_it_is_compared_with_the_quickest(delays):
         assert age == pytest.approx(delay - quickest, abs=1e-4 * 5.0 * (i + 1) + 1e-6)
 
 
-def test_a_link_that_grows_quicker_is_no_restart():
-    clock = BoatClock()
-    ages = [heard(clock, 10.0 + 0.05 * i, 2.0 if i < 3 else 0.02) for i in range(20)]
-    assert ages[3 : 3 + BELIEVED_AFTER - 1] == [None] * (BELIEVED_AFTER - 1)
-    assert ages[-1] == pytest.approx(0.0, abs=0.01)
-    assert clock.starts == 1
-
-
-def test_a_quicker_message_is_believed_at_once_where_the_round_trip_allows_it():
-    clock, now = warmed(delay_s=2.0)
-    clock.sync(now, now + OFFSET - 0.01, now + OFFSET + 0.01)
-    assert heard(clock, now, 0.0) == pytest.approx(0.0, abs=0.02)
-
-
 def test_a_drifting_clock_is_followed():
     clock = BoatClock()
     for i in range(20_000):
@@ -89,14 +75,6 @@ def test_a_restart_is_believed_when_enough_agree():
     assert clock.starts == 2
 
 
-def test_old_packets_among_new_ones_are_no_restart():
-    clock, now = warmed()
-    for i in range(20):
-        assert clock.hear(now + 0.05 * i - 3.0, now + OFFSET + 0.05 * i) is None
-        assert clock.hear(now + 0.05 * i, now + OFFSET + 0.05 * i + 0.02) is not None
-    assert clock.starts == 1
-
-
 def test_a_clock_that_lost_time_is_noticed_by_the_round_trip():
     clock, now = warmed()
     clock.sync(now, now + OFFSET - 0.01, now + OFFSET + 0.01)
@@ -105,13 +83,6 @@ def test_a_clock_that_lost_time_is_noticed_by_the_round_trip():
     clock.sync(now, received - 0.001, received)
     assert clock.starts == 2
     assert received - clock.hear(now + 0.01, received + 0.01) < 0.1
-
-
-def test_a_little_time_lost_is_made_good_without_a_restart():
-    clock, now = warmed()
-    clock.sync(now, now + OFFSET + 0.2, now + OFFSET + 0.201)
-    assert clock.starts == 1
-    assert heard(clock, now + 0.05, 0.2) == pytest.approx(0.0, abs=0.01)
 
 
 def test_answers_from_another_clock_or_nonsense_are_left():
@@ -123,10 +94,3 @@ def test_answers_from_another_clock_or_nonsense_are_left():
     assert clock.starts == 1
     assert math.isnan(clock.round_trip_s)
     assert heard(clock, now, 0.02) == pytest.approx(0.0, abs=0.01)
-
-
-def test_a_round_trip_before_any_telemetry_is_left():
-    clock = BoatClock()
-    clock.sync(5.0, 1.0, 1.1)
-    assert math.isnan(clock.round_trip_s)
-    assert clock.shortest_delay_s == 0.0

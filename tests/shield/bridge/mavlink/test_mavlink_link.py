@@ -86,12 +86,6 @@ def test_nothing_is_sent_that_is_no_number_and_nothing_before_prepare():
         assert not boat.targets
 
 
-def test_speeds_are_limited_to_what_the_boat_takes_and_said_so():
-    with linked() as (_, link):
-        assert link.send(0.0, 1e9).speed_mps == pytest.approx(2.0)
-        assert link.send(0.0, -1e9).speed_mps == pytest.approx(-2.0)
-
-
 @pytest.mark.parametrize(
     ("boat", "seconds", "words"),
     [
@@ -156,15 +150,6 @@ def test_a_boat_still_booting_is_asked_again():
         link.prepare(30.0)
         assert boat.armed
         assert link.read().ready
-
-
-def test_no_answer_at_all_is_told_from_a_refusal():
-    with linked(prepared=False) as (boat, link):
-        link.connect(20.0)
-        link.learn(20.0)
-        boat.answers = False
-        with pytest.raises(LinkError, match="no answer to the request for GUIDED; check the radio"):
-            link.prepare(1.0)
 
 
 def test_preparing_without_connecting_is_refused():
@@ -267,23 +252,6 @@ def test_a_boat_that_is_not_reached_in_the_end_is_not_taken_back(monkeypatch):
         text, reading = retaken(boat, link)
         assert "no heartbeat" in text
         assert reading.released
-
-
-def test_taking_back_is_called_off_at_once():
-    with linked() as (boat, link):
-        text, reading = retaken(boat, link, 1e3, lambda: boat.mode == 15)
-        assert "called off" in text
-        assert reading.released
-
-
-def test_a_boat_given_back_and_not_taken_is_left_alone_at_the_end():
-    with linked() as (boat, link):
-        boat.mode = 0
-        assert wait_for(lambda: not link.read().ready)
-        boat.mode = 15
-        assert wait_for(lambda: "given back" in link.read().why_not)
-        assert "left alone, armed in GUIDED" in link.close()
-        assert boat.mode == 15
 
 
 def test_a_changed_top_speed_is_used_at_once():

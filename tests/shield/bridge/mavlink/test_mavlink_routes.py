@@ -57,24 +57,6 @@ def test_velocity_says_heading_and_speed_and_nothing_else(heading, speed):
     assert encoded.speed_mps == pytest.approx(math.hypot(got.vx, got.vy))
 
 
-def test_velocity_never_asks_for_a_boat_to_go_astern():
-    assert VelocityRoute(None).encode(TARGET, 0, 1.0, -2.0).speed_mps == pytest.approx(1e-3)
-
-
-@settings(deadline=None)
-@given(headings, speeds)
-def test_no_route_uses_a_mask_that_was_seen_to_fail(heading, speed):
-    for route in (AttitudeRoute(2.0), VelocityRoute(2.0)):
-        got = on_the_wire(route.encode(TARGET, 0, heading, speed))
-        if got.get_type() == "SET_ATTITUDE_TARGET":
-            assert not got.type_mask & 64
-            assert not got.type_mask & 128
-        else:
-            assert got.coordinate_frame == mavlink.MAV_FRAME_LOCAL_NED
-            assert got.type_mask & 1024
-            assert got.type_mask & 2048
-
-
 def test_the_stop_without_a_heading_asks_for_no_turn_and_no_thrust():
     mav = mavlink.MAVLink(None)
     got = mav.decode(bytearray(AttitudeRoute(2.0).straight_stop(TARGET, 0).pack(mav)))

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from steerclear.shield.bridge.frame import FieldFrame
-from steerclear.shield.bridge.mavlink.telemetry import FIX_SILENT_S, FixWatch, Streams, Telemetry
+from steerclear.shield.bridge.mavlink.telemetry import FIX_SILENT_S, Streams, Telemetry
 
 FRAME = FieldFrame(42.0, -71.0)
 OFFSET = 500.0
@@ -91,15 +91,6 @@ def test_a_boat_going_astern_has_a_negative_speed():
     boat.speed = -0.8
     boat.run(1.0)
     assert boat.telemetry.speed_mps == pytest.approx(-0.8, abs=0.01)
-
-
-def test_telemetry_a_second_late_is_a_second_old():
-    boat = Boat()
-    boat.speed = 1.0
-    boat.run(2.0)
-    boat.delay = 1.01
-    boat.run(2.0)
-    assert boat.age() == pytest.approx(1.0, abs=0.02)
 
 
 def test_older_messages_never_replace_newer_ones():
@@ -276,11 +267,6 @@ def test_a_receiver_that_falls_silent_has_lost_its_fix():
     assert boat.run(0.2, gps()).age() < 0.06
 
 
-def test_a_receiver_that_never_spoke_is_not_missed_here():
-    assert Boat().run(30.0).age() < 0.06
-    assert Boat().telemetry.fix.fix_type == -1
-
-
 def test_a_gap_of_the_whole_link_is_no_silence_of_the_receiver():
     boat = Boat().run(3.0, gps())
     boat.now += 30.0
@@ -298,18 +284,6 @@ def test_one_receiver_with_a_fix_is_enough():
     boat.run(5.0, gps(1), second(1))
     assert boat.telemetry.faults["no_fix"]
     assert "GPS has no fix (fix type 1), GPS 2 has no fix (fix type 1)" in boat.texts[-1]
-
-
-def test_what_is_not_available_is_no_fault():
-    watch = FixWatch()
-    watch.hear(gps(3, eph=65_535, h_acc=0), 1.0)
-    assert watch.fault(1.0) == ("", "")
-
-
-def test_a_restart_forgets_what_was_said_of_the_fix():
-    boat = Boat().run(5.0, gps(1))
-    boat.telemetry.forget()
-    assert boat.telemetry.fix.fix_type == -1
 
 
 def test_the_messages_are_asked_for_and_asked_again_once_they_stop():

@@ -12,6 +12,7 @@ import threading
 import time
 
 import pytest
+from moos_boats import until
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.moos import client as client_module
 from steerclear.shield.bridge.moos.client import MoosClient
@@ -19,15 +20,6 @@ from steerclear.shield.bridge.moos.stand_in import StandInDb
 from steerclear.shield.bridge.moos.wire import PROTOCOL, Message, WireError, pack_packet, timing
 
 logging.getLogger("steerclear").setLevel(logging.ERROR)
-
-
-def until(condition, seconds=6.0):
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        if condition():
-            return True
-        time.sleep(0.01)
-    return False
 
 
 @contextlib.contextmanager

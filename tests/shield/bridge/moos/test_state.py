@@ -93,12 +93,6 @@ def test_a_report_is_a_contact_with_the_age_of_its_time():
     assert heard.read()[0].fixed_s == 101.0
 
 
-def test_without_x_and_y_latitude_and_longitude_are_taken():
-    heard = contacts()
-    heard.hear("NAME=red_1,LAT=42.0001,LON=-71,SPD=0,HDG=0,TIME=1", "blue_1", 0.0, 1.0)
-    assert heard.read()[0].position_m == pytest.approx((0.0, 11.1), abs=0.1)
-
-
 @pytest.mark.parametrize(
     ("text", "why"),
     [
