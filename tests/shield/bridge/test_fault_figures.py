@@ -5,14 +5,13 @@ are: how long until the declared answer is in effect, and how near they come to 
 """
 
 import math
-import re
-from pathlib import Path
 
+import drill_times
 import numpy as np
 import pytest
 from bridge_fakes import pair
 
-DOC = Path(__file__).parents[3] / "docs" / "studies" / "boats.md"
+VERSION = "now"  # of `drill_times`: this tree
 STRUCK_S, AFTER_S = 1004.0, 20.0
 LATE = "limits: {navigation: {max_age_s: 1.5, then: stop}}"
 
@@ -115,14 +114,6 @@ def driven(strike, settings):
     return seen, world
 
 
-def row_of(name):
-    """What the documentation says: answered after s (None: nothing to answer), closest m."""
-    found = re.search(rf"^\| {re.escape(name)} \| ([^|]+) \| ([^|]+) \| ([^|]+) \|$", DOC.read_text(), re.MULTILINE)
-    assert found, f"no row of {name!r} in {DOC.name}"
-    answered = re.match(r"[\d.]+", found[2])
-    return None if answered is None else float(answered[0]), float(found[3].split()[0])
-
-
 @pytest.mark.parametrize("name", DRILLS)
 def test_a_drill_is_answered_in_time_and_as_documented(name):
     strike, answer, deadline_s, settings = DRILLS[name]
@@ -137,6 +128,10 @@ def test_a_drill_is_answered_in_time_and_as_documented(name):
     if name.startswith("policy"):
         assert ("policy", "hold_station") in seen[-1][1]  # given up in the end
     assert answered_s is None or answered_s <= deadline_s + 1e-6
-    told_s, told_m = row_of(name)
-    assert told_s == (None if answered_s is None else pytest.approx(answered_s, abs=0.11))
-    assert told_m == pytest.approx(closest_m, abs=0.15)
+    told = drill_times.times()[VERSION][name]
+    assert told["after_s"] == (None if answered_s is None else pytest.approx(answered_s, abs=0.11))
+    assert told["closest_m"] == pytest.approx(closest_m, abs=0.15)
+
+
+def test_the_page_tells_the_times_of_all_versions():
+    assert drill_times.table(drill_times.times()).join(drill_times.MARKS) in drill_times.PAGE.read_text()
