@@ -239,7 +239,7 @@ def test_every_parameter_that_is_looked_at_is_asked_for():
         (
             {"FENCE_ENABLE": 1.0, "FENCE_ACTION": 2.0, "FENCE_MARGIN": 2.0},
             False,
-            "15.3 m or more outside the hard line",
+            "11.8 m or more outside the hard line",
         ),
         ({"FENCE_ENABLE": 1.0, "FENCE_ACTION": 0.0}, False, "only reports and stops nothing: set it to 2"),
         ({"FENCE_ENABLE": 1.0, "FENCE_ACTION": 1.0}, False, "FENCE_ACTION is 1 (RTL)"),
