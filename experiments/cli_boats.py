@@ -35,8 +35,7 @@ from .deploy.keys import figure_rows
 from .deploy.orders import Orders, Outcome, Surface
 from .deploy.plain import PlainLines
 from .deploy.quiet import logging_aside
-from .deploy.referee import RATE_HZ, Referee
-from .deploy.rules import game_config
+from .deploy.referee import RATE_HZ, Referee, game_config
 from .deploy.run import deploy as run_boats
 from .deploy.run import preflight as check_boats
 from .deploy.run import sea_trial as try_boats

@@ -14,7 +14,7 @@ from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.messages import Tick
 from steerclear.shield.exceptions import ConfigError, GameError
 
-from .rules import game_config
+from .referee import game_config
 
 _BITS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]], dtype=np.uint8)
 _BLANK = 0x2800

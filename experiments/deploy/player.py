@@ -32,7 +32,7 @@ from steerclear.shield.jit import Array
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.usv import wrap_degrees
 
-from .rules import game_config, stand_in_config
+from .referee import game_config, stand_in_config
 
 NEED_NO_GAME = ("hold", "random", "waypoints")
 """Policies that look at no flag and at nobody: they also steer boats that play no game."""

@@ -1,19 +1,193 @@
-"""`Referee`: hears where boats are, keeps the game by the env's rules, and tells everybody how it stands."""
+"""The rules over boats that something else moves: `Umpire` applies them, `Referee` hears boats and tells the game."""
 
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Callable, Sequence
+from difflib import get_close_matches
+from typing import Any
 
+import numpy as np
+from steerclear.env.arrays import CAPTURE
+from steerclear.env.config import GameConfig
+from steerclear.env.core import BatchedMctf
 from steerclear.shield.bridge.clock import Clock
-from steerclear.shield.bridge.feed import FeedReceiver, FeedSender, GameState
+from steerclear.shield.bridge.feed import BoatStatus, FeedReceiver, FeedSender, FlagStatus, GameState
 from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.messages import Contact
 from steerclear.shield.bridge.session import key_of
 from steerclear.shield.compat import Self
-from steerclear.shield.exceptions import FleetFileError
+from steerclear.shield.exceptions import ConfigError, FleetFileError, GameError
+from steerclear.shield.platforms import Platform
+from steerclear.shield.platforms import layout as L
+from steerclear.shield.surroundings import OPEN_WATER, Surroundings
+from steerclear.shield.wrappers.mctf import surroundings_of
 
-from .rules import Umpire, game_config, player_names
+FROM_FILE = {
+    "team_size": "boats",
+    "env_bounds_m": "field.size_m",
+    "platforms": "boats.platform",
+    "dt_s": "rate_hz",
+}
+"""Settings of the game that other keys of a fleet file say."""
+CARRY_S = 1.0
+"""A boat's last fix is carried forward along its heading by this time at most, s."""
+SIDES = ("blue", "red")
+
+
+def game_config(fleet: FleetFile) -> GameConfig:
+    """Settings of the game a fleet plays: the preset's, with the file's field, boats, rate and ``rules``.
+
+    Raises:
+        FleetFileError: no boat has an agent, the preset or a rule is unknown, or a rule contradicts another key.
+    """
+    players = player_names(fleet)
+    if not players:
+        raise FleetFileError("no boat plays; give boats an agent: agent_0, agent_1, ..., blue first")
+    return _config(fleet, tuple(fleet.platform_of[name] for name in players))
+
+
+def stand_in_config(fleet: FleetFile, boats: Sequence[str]) -> GameConfig:
+    """Settings of a game for boats that play none, as `game_config`: they are one team, and nobody is the other."""
+    return _config(fleet, 2 * tuple(fleet.platform_of[name] for name in boats))
+
+
+def _config(fleet: FleetFile, platforms: tuple[Platform, ...]) -> GameConfig:
+    known = GameConfig.names()
+    for rule in fleet.rules:
+        if rule in FROM_FILE:
+            raise FleetFileError(f"rules.{rule} is what {FROM_FILE[rule]} says; leave it out")
+        if rule not in known:
+            near = get_close_matches(rule, known, 1)
+            hint = f"did you mean {near[0]!r}?" if near else f"known settings: {', '.join(known)}"
+            raise FleetFileError(f"rules: unknown game setting {rule!r}; {hint}")
+    values = (len(platforms) // 2, tuple(fleet.field.size_m), platforms, fleet.dt_s)
+    given: dict[str, Any] = dict(zip(FROM_FILE, values, strict=True))
+    try:
+        return GameConfig.preset(fleet.preset, **given, **fleet.rules)
+    except (ConfigError, GameError) as error:
+        raise FleetFileError(f"preset and rules: {error}") from None
+
+
+def player_names(fleet: FleetFile) -> tuple[str, ...]:
+    """Names of the boats that play, in the order of their agents."""
+    return tuple(boat.name for boat in fleet.boats if boat.agent is not None)
+
+
+def game_obstacles(fleet: FleetFile) -> Surroundings:
+    """Obstacles of the game, and the circle of our own flag at home as ``stops``; nothing when no boat plays.
+
+    Raises:
+        FleetFileError: the preset or a rule is unknown, or a rule contradicts another key.
+    """
+    if not fleet.agent_ids:
+        return OPEN_WATER
+    return surroundings_of(BatchedMctf(game_config(fleet)), fleet.team_number)
+
+
+class Umpire:
+    """Watches the boats of one game and applies the rules; moves nothing.
+
+    The rules are those of `BatchedMctf.follow`. The game begins when every boat has been heard of; from then on a boat
+    not heard of for ``lost_after_s`` counts as out of bounds until it is heard of again.
+
+    Attributes:
+        names: of the boats, in the order of their agents.
+        began: whether the game has begun.
+        events: what happened at the last look, a line each.
+
+    Raises:
+        GameError: there are not as many names as boats.
+    """
+
+    def __init__(self, config: GameConfig, names: Sequence[str], lost_after_s: float = 5.0) -> None:
+        if len(names) != config.n_boats:
+            raise GameError(f"{len(names)} names for {config.n_boats} boats; name each boat of the game")
+        core = BatchedMctf(config)  # the rules are compiled now: the game's first seconds are not spent on it
+        seen = core.state[..., : L.SPEED + 1].copy()
+        core.start_seen(seen)
+        core.follow(seen, config.dt_s)
+        core.commands(np.zeros((1, config.n_boats, 2)))
+        self.core = BatchedMctf(config)
+        self.names = tuple(names)
+        self.lost_after_s = lost_after_s
+        self.began = False
+        self.events: tuple[str, ...] = ()
+        self._at_s = -math.inf
+
+    @property
+    def over(self) -> bool:
+        """Whether the game has ended."""
+        return bool(self.core.terminated[0] or self.core.truncated[0])
+
+    def watch(self, contacts: Sequence[Contact], now_s: float) -> GameState:
+        """Look at the latest contact of each boat and say how the game stands; after its end it stands as it ended.
+
+        ``now_s`` is on the clock of the contacts; boats of no game are not looked at.
+        """
+        known = {contact.boat: contact for contact in contacts}
+        seen = np.array([self._seen(known.get(name), now_s) for name in self.names])
+        lost = [name for name, row in zip(self.names, seen, strict=True) if np.isnan(row[0])]
+        self.events, note = (), ""
+        if not self.began:
+            if lost:
+                waiting = [name for name in self.names if name not in known]
+                return self.state(f"waiting for {', '.join(waiting) or 'boats that are lost'}")
+            self.core.start_seen(seen[np.newaxis])
+            self.began, self.events = True, ("the game begins",)
+        elif not self.over:
+            before = self.core.view()
+            self.core.follow(seen[np.newaxis], max(0.0, now_s - self._at_s))
+            self.events = tuple(self._told(before))
+            note = f"lost, so out of bounds: {', '.join(lost)}" if lost else ""
+        self._at_s = now_s
+        return self.state(note)
+
+    def _seen(self, contact: Contact | None, now_s: float) -> tuple[float, float, float, float]:
+        """X m, y m, heading deg, speed m/s of a boat now; NaN when it is lost."""
+        if contact is None or now_s - contact.fixed_s > self.lost_after_s:
+            return (math.nan,) * 4
+        (x_m, y_m), heading_rad = contact.position_m, contact.heading_rad
+        ahead_m = contact.speed_mps * min(max(0.0, now_s - contact.fixed_s), CARRY_S)
+        place = x_m + ahead_m * math.sin(heading_rad), y_m + ahead_m * math.cos(heading_rad)
+        return *place, math.degrees(heading_rad), contact.speed_mps
+
+    def state(self, note: str = "") -> GameState:
+        """How the game stands, as of the last look."""
+        if self.began:
+            self.core.commands(np.zeros((1, len(self.names), 2)))  # tells which boats the game drives
+        return state_of(self.core, self.names, note)
+
+    def _told(self, before: Any) -> list[str]:
+        core, told = self.core, []
+        for i, name in enumerate(self.names):
+            if core.made_tag[0, i] >= 0:
+                told.append(f"{name} tags {self.names[core.made_tag[0, i]]}")
+            if core.has_flag[0, i] and not before.has_flag[i]:
+                told.append(f"{name} grabs the flag")
+            if core.oob[0, i] and not before.oob[i]:
+                told.append(f"{name} is out of bounds")
+            if before.is_tagged[i] and not core.is_tagged[0, i]:
+                told.append(f"{name} is free again")
+        for team, side in enumerate(SIDES):
+            if core.events[0, team, CAPTURE]:
+                told.append(f"{side} captures the flag: {core.captures[0, 0]} : {core.captures[0, 1]}")
+        return [*told, "the game is over"] if self.over else told
+
+
+def state_of(core: BatchedMctf, names: Sequence[str], note: str = "") -> GameState:
+    """The state of a running game (number 0 of ``core``) under the boats' names."""
+    arrays = (core.is_tagged, core.has_flag, core.oob, core.on_side, core.tagging_cooldown_s, core.driven)
+    rows = zip(*(array[0].tolist() for array in arrays), strict=True)
+    keys = ("tagged", "has_flag", "oob", "on_side", "cooldown_s", "driven")
+    boats = {name: BoatStatus(**dict(zip(keys, row, strict=True))) for name, row in zip(names, rows, strict=True)}
+    places = zip(core.flag_position[0].tolist(), core.flag_taken[0].tolist(), strict=True)
+    flags = [FlagStatus(x_m, y_m, bool(taken)) for (x_m, y_m), taken in places]
+    counts = {name: tuple(getattr(core, name)[0].tolist()) for name in ("captures", "grabs", "tags")}
+    over = bool(core.terminated[0] or core.truncated[0])
+    return GameState(float(core.time_s[0]), boats, (flags[0], flags[1]), **counts, over=over, note=note)
+
 
 RATE_HZ = 10.0
 LINGER_S = 3.0

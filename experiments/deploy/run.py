@@ -40,12 +40,11 @@ from steerclear.shield.bridge.preflight_checks import (
 from steerclear.shield.bridge.session import VehicleSession, key_of
 from steerclear.shield.bridge.tracker import Tracker
 
-from .orders import LONGEST_MINUTES, Orders, Outcome, Surface, read_fleet, refuse_early
+from .orders import DRILLED, LONGEST_MINUTES, Orders, Outcome, Surface, check_drill, keep, read_fleet, refuse_early
 from .plain import Tally
 from .policy_process import PolicyProcess
-from .preflight_file import DRILLED, check_drill, keep
 from .quiet import ended_by_signals, undisturbed, warm_up
-from .rules import game_obstacles
+from .referee import game_obstacles
 from .sea_trial import SeaTrial, longest_s
 
 LOG = logging.getLogger(__name__)

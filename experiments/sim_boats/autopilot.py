@@ -17,8 +17,7 @@ from steerclear.shield.bridge.mavlink.signing import Signing
 from .hull import Steer, Turn
 from .sensing import Snapshot
 from .settings import AutopilotSettings
-from .telemetry import CAN_SEND, Telemetry
-from .vehicle import PARAMETERS, Streams, Vehicle
+from .vehicle import CAN_SEND, PARAMETERS, Streams, Telemetry, Vehicle
 
 COMPONENT = 1
 ACCEPTED, DENIED = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED

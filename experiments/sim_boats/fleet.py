@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from steerclear.env.config import GameConfig
 from steerclear.env.record import DEFAULT_SEPARATION_M, Record
-from steerclear.experiments.deploy.rules import game_config
+from steerclear.experiments.deploy.referee import game_config
 from steerclear.shield.bridge.clock import Clock, MonotonicClock
 from steerclear.shield.bridge.fleet_file import FleetFile, load_fleet
 from steerclear.shield.bridge.frame import FieldFrame
@@ -29,9 +29,8 @@ from .boat import Boat, Setting
 from .game import Game, game_of, playing, start_places
 from .hull import STEP_S, Weather
 from .settings import AutopilotSettings, RadioSettings, SimBoat, Water, check_bounds
-from .truth import Approach, TruthRecord, record_of
 from .wires import Ports, near
-from .world import PositionHub, World
+from .world import Approach, PositionHub, TruthRecord, World, record_of
 
 LOG = logging.getLogger(__name__)
 

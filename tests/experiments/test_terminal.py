@@ -125,7 +125,7 @@ import steerclear.shield.bridge.mavlink, steerclear.experiments.deploy.run
 for command in [[], *[[info.name or info.callback.__name__.replace("_", "-")] for info in cli.app.registered_commands]]:
     done = CliRunner().invoke(cli.app, [*command, "--help"])
     assert done.exit_code == 0, (command, done.output, done.exception)
-from steerclear.experiments.deploy.controls import Keyboard
+from steerclear.experiments.deploy.dashboard import Keyboard
 assert not Keyboard(print).is_terminal
 done = CliRunner().invoke(cli.app, ["ablate", "--opponents", "nobody"])
 assert done.exit_code == 2, done.output

@@ -15,7 +15,7 @@ from ..fleet_file import FleetFile
 from ..fleet_settings import BoatSettings, MoosLinkSettings
 from ..messages import Answer, Link, LinkMaker, WantedSource
 from .contacts import MoosContacts
-from .gates import HelmGate
+from .drivers import HelmGate
 from .vehicle import MoosLink
 
 POLICY = "moos"

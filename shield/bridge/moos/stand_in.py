@@ -16,8 +16,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-from .drivers import OVERRIDES
-from .gates import HelmGate
+from .drivers import OVERRIDES, HelmGate
 from .wire import (
     DATA,
     DOUBLE,

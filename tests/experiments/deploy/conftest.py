@@ -7,7 +7,7 @@ import textwrap
 
 import numpy as np
 import pytest
-from steerclear.experiments.deploy.rules import state_of
+from steerclear.experiments.deploy.referee import state_of
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.bridge.messages import Snapshot
 from steerclear.shield.platforms import layout as L

@@ -8,7 +8,7 @@ import time
 import numpy as np
 from steerclear import policies
 from steerclear.env.mctf import MctfEnv
-from steerclear.experiments.deploy.rules import game_config, player_names, state_of
+from steerclear.experiments.deploy.referee import game_config, player_names, state_of
 from steerclear.shield import Commands, Reason, Shield, ShieldConfig
 from steerclear.shield.bridge.messages import BoatReading, Contact, Sent, Tick
 from steerclear.shield.decision import Decisions

@@ -6,7 +6,7 @@ import time
 
 import pytest
 from made_ticks import wait_for
-from steerclear.experiments.deploy.controls import Controls, Keyboard
+from steerclear.experiments.deploy.dashboard import Controls, Keyboard
 from steerclear.experiments.sim_boats.demo import demo_fleet
 from steerclear.shield.bridge.clock import ManualClock
 from steerclear.shield.bridge.failsafe_table import DISABLES

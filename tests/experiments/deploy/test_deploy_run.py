@@ -10,11 +10,18 @@ from made_ticks import repeating
 from steerclear.env.core import BatchedMctf
 from steerclear.experiments.cli import app
 from steerclear.experiments.deploy.demo import free_ports
-from steerclear.experiments.deploy.orders import Orders, Surface, read_fleet
+from steerclear.experiments.deploy.orders import (
+    Orders,
+    Surface,
+    check_drill,
+    keep,
+    measured_delay_s,
+    path_of,
+    read_fleet,
+)
 from steerclear.experiments.deploy.plain import Tally
-from steerclear.experiments.deploy.preflight_file import check_drill, keep, measured_delay_s, path_of
 from steerclear.experiments.deploy.proof import prove
-from steerclear.experiments.deploy.rules import game_config, game_obstacles, player_names, state_of
+from steerclear.experiments.deploy.referee import game_config, game_obstacles, player_names, state_of
 from steerclear.experiments.deploy.run import deploy, preflight
 from steerclear.experiments.sim_boats import AutopilotSettings, SimFleet
 from steerclear.shield.bridge.blackbox import LogReader, log_path

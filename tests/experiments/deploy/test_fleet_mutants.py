@@ -6,7 +6,7 @@ import time
 
 import pytest
 from steerclear.experiments.deploy.orders import rehearse
-from steerclear.experiments.deploy.rules import game_obstacles
+from steerclear.experiments.deploy.referee import game_obstacles
 from steerclear.experiments.sim_boats.demo import demo_text
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.exceptions import SteerclearError

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from steerclear import policies
 from steerclear.env.mctf import MctfEnv
-from steerclear.experiments.deploy.rules import game_config, game_obstacles, state_of
+from steerclear.experiments.deploy.referee import game_config, game_obstacles, state_of
 from steerclear.shield import Commands, Shield
 from steerclear.shield.bridge.feed import game_state
 from steerclear.shield.bridge.fleet_file import parse_fleet

@@ -11,7 +11,7 @@ from steerclear import policies
 from steerclear.env.mctf import MctfEnv
 from steerclear.experiments.deploy.orders import rehearse
 from steerclear.experiments.deploy.player import NEED_NO_GAME, Observer, Orders, cast_of, load_player
-from steerclear.experiments.deploy.rules import game_config, game_obstacles
+from steerclear.experiments.deploy.referee import game_config, game_obstacles
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.bridge.messages import Snapshot
 from steerclear.shield.exceptions import FleetError, FleetFileError, PolicyError

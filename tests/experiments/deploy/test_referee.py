@@ -18,8 +18,7 @@ from steerclear.env.mctf import MctfEnv
 from steerclear.experiments.cli import app
 from steerclear.experiments.deploy import referee as referee_module
 from steerclear.experiments.deploy.demo import free_ports
-from steerclear.experiments.deploy.referee import Referee
-from steerclear.experiments.deploy.rules import Umpire, game_config, player_names, state_of
+from steerclear.experiments.deploy.referee import Referee, Umpire, game_config, player_names, state_of
 from steerclear.experiments.sim_boats import AutopilotSettings, SimFleet
 from steerclear.shield.bridge.clock import ManualClock, MonotonicClock
 from steerclear.shield.bridge.feed import FeedReceiver, FeedSender, Fix, GameState

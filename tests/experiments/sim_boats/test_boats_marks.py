@@ -4,7 +4,7 @@ import pytest
 from boat_links import READY
 from steerclear.experiments.sim_boats import SimBoat, SimFleet
 from steerclear.experiments.sim_boats.hull import STEP_S
-from steerclear.experiments.sim_boats.truth import Mark, circumstances, last_commanded
+from steerclear.experiments.sim_boats.world import Mark, circumstances, last_commanded
 
 STEERED = Mark(True, (), True)
 ALONE = Mark(False, ("link_loss",))

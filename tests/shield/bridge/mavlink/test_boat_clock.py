@@ -5,7 +5,7 @@ import math
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from steerclear.shield.bridge.mavlink.boat_clock import BELIEVED_AFTER, BoatClock
+from steerclear.shield.bridge.mavlink.telemetry import BELIEVED_AFTER, BoatClock
 
 OFFSET = 1000.0
 

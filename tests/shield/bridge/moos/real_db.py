@@ -9,8 +9,7 @@ from dataclasses import replace
 from moos_boats import until
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.moos.client import MoosClient
-from steerclear.shield.bridge.moos.drivers import VARIABLES
-from steerclear.shield.bridge.moos.gates import HelmGate
+from steerclear.shield.bridge.moos.drivers import VARIABLES, HelmGate
 from steerclear.shield.bridge.moos.wire import notify
 
 

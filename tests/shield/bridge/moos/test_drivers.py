@@ -6,8 +6,7 @@ import pytest
 from steerclear.shield.bridge.frame import FieldFrame
 from steerclear.shield.bridge.messages import BoatReading
 from steerclear.shield.bridge.moos.checks import mission_faults, parse_mission
-from steerclear.shield.bridge.moos.drivers import Drivers
-from steerclear.shield.bridge.moos.gates import HelmGate
+from steerclear.shield.bridge.moos.drivers import Drivers, HelmGate
 from steerclear.shield.bridge.moos.wire import Message
 from steerclear.shield.platforms import get_platform
 
