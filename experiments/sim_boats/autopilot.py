@@ -106,10 +106,9 @@ class Autopilot:
 
     def _send_now(self, message: int) -> int:
         """Send one of the known messages, outside its interval; the result to acknowledge."""
-        built = self._telemetry.build(message, self.snapshot, self.now_s) if message in CAN_SEND else None
-        if built is None:
+        if message not in CAN_SEND:
             return FAILED
-        self._send(built)
+        self._send(self._telemetry.build(message, self.snapshot, self.now_s))
         return ACCEPTED
 
     def _acknowledge(self, command: int, result: int, message: Any) -> None:

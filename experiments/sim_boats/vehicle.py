@@ -33,24 +33,17 @@ _CAPABILITIES = (
 
 @dataclass
 class Telemetry:
-    """Builds the messages of one boat: a method each, named as its message.
-
-    ``origin``: where the position was first known after power on, its own origin of LOCAL_POSITION_NED, so that it
-    differs from boat to boat.
-    """
+    """Builds the messages of one boat: a method each, named as its message."""
 
     vehicle: Vehicle
     frame: FieldFrame
-    origin: Snapshot | None = None
 
-    def build(self, number: int, seen: Snapshot, now_s: float) -> Any | None:
-        """The message of that number, or None while the boat cannot know what it would say."""
+    def build(self, number: int, seen: Snapshot, now_s: float) -> Any:
+        """The message of that number."""
         self._seen, self._now_s, self._placed = seen, now_s, self.vehicle.has_position(now_s)
         self._east, self._north = self.frame.turn_to_earth(*seen.velocity_mps)
         self._yaw_rad = self.frame.heading_to_true_rad(seen.heading_rad)
         self._boot_ms = self._since_boot_ms(seen.time_s)
-        if self._placed and self.origin is None:
-            self.origin = seen
         return getattr(self, CAN_SEND[number])()
 
     def _since_boot_ms(self, time_s: float) -> int:
@@ -80,18 +73,6 @@ class Telemetry:
             yaw = math.pi * math.sin(37.0 * self._now_s)  # still looking for it
         return mavlink.MAVLink_attitude_message(self._boot_ms, 0.0, 0.0, yaw, 0.0, 0.0, self._seen.turn_rate_rads)
 
-    def _local_position_ned(self) -> Any | None:
-        if not self._placed or self.origin is None:
-            return None
-        east, north = self.frame.turn_to_earth(self._seen.x_m - self.origin.x_m, self._seen.y_m - self.origin.y_m)
-        return mavlink.MAVLink_local_position_ned_message(self._boot_ms, north, east, 0.0, self._north, self._east, 0.0)
-
-    def _gps_global_origin(self) -> Any | None:
-        if not self._placed or self.origin is None:
-            return None
-        place = (round(self.origin.latitude_deg * 1e7), round(self.origin.longitude_deg * 1e7))
-        return mavlink.MAVLink_gps_global_origin_message(*place, 0, round(self._now_s * 1e6))
-
     def _gps_raw_int(self) -> Any:
         seen, fix = self._seen, 6 if self._placed and self._seen.has_fix else 1
         place = (round(seen.latitude_deg * 1e7), round(seen.longitude_deg * 1e7))
@@ -101,17 +82,9 @@ class Telemetry:
             round(seen.time_s * 1e6), fix, *place, 0, 80, 120, speed, course, satellites
         )
 
-    def _vfr_hud(self) -> Any:
-        speed = math.hypot(*self._seen.velocity_mps)
-        heading = round(math.degrees(self._yaw_rad)) % 360
-        return mavlink.MAVLink_vfr_hud_message(speed, speed, heading, 0, 0.0, 0.0)
-
     def _system_time(self) -> Any:
         unix_us = _UNIX_2024_US + round(self._now_s * 1e6)
         return mavlink.MAVLink_system_time_message(unix_us, self._since_boot_ms(self._now_s))
-
-    def _sys_status(self) -> Any:
-        return mavlink.MAVLink_sys_status_message(0, 0, 0, 100, 12_600, 500, 90, 0, 0, 0, 0, 0, 0)
 
     def _ekf_status_report(self) -> Any:
         flags = _ESTIMATE_FLAGS if self._placed else mavlink.EKF_ATTITUDE
