@@ -49,8 +49,9 @@ def play_both(fleet, policy, snapshot_of, steps, seed=5, opponent="medium"):
         team.close()
 
 
-@pytest.mark.parametrize("policy", ["medium", "hard", "easy", "waypoints", "random", "rammer", "hidden"])
-@pytest.mark.parametrize("side", ["blue", "red"])
+@pytest.mark.parametrize(
+    ("policy", "side"), [("medium", "blue"), ("hard", "red"), ("easy", "blue"), ("random", "red"), ("hidden", "red")]
+)
 def test_scripted_policies_answer_bit_for_bit_what_they_answer_in_the_game(fleet_of, snapshot_of, policy, side):
     for _, play, commands, ours, *_ in play_both(fleet_of(team=side), policy, snapshot_of, 150):
         assert play.problems == ()

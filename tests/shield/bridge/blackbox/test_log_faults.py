@@ -228,9 +228,9 @@ class Slow:
     def flush(self): time.sleep(0.2)  # so that the process is suspended while something is on its way
     def finish(self): pass
 
-spool = AsyncWriter("run", Slow(), flush_s=0.02, give_up_s=1.5)
+spool = AsyncWriter("run", Slow(), flush_s=0.02, give_up_s=0.8)
 print("begun", flush=True)
-for number in range(60):
+for number in range(24):
     spool.put(number)
     time.sleep(0.05)
 spool.close()
@@ -243,9 +243,9 @@ def test_a_suspended_runner_is_not_told_as_a_slow_disk():
         [sys.executable, "-c", SUSPENDED], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
     assert process.stdout.readline() == "begun\n"
-    time.sleep(0.5)
+    time.sleep(0.3)
     process.send_signal(signal.SIGSTOP)
-    time.sleep(2.5)
+    time.sleep(1.8)
     process.send_signal(signal.SIGCONT)
     out, told = process.communicate(timeout=60)
     assert (out, told) == ("well\n", "")
