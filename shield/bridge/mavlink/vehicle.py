@@ -11,9 +11,9 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from ...exceptions import LinkError, LinkRefused
+from ..autopilot_parameters import ASKED, FENCE_ASKED
 from ..clock import Clock
 from ..frame import FieldFrame
-from ..link_checks import ASKED, FENCE_ASKED
 from ..messages import NEVER_S, BoatReading, Link, Sent, check_finite, never
 from .autopilot import Autopilot
 from .commands import (

@@ -6,11 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bridge_fakes import fleet_of, fleet_text
+from steerclear.shield.bridge.autopilot_parameters import ASKED, FENCE_ASKED
 from steerclear.shield.bridge.clock import ManualClock
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.bridge.link_checks import (
-    ASKED,
-    FENCE_ASKED,
     Watched,
     check_autopilot,
     check_clock,

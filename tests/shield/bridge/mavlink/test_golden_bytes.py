@@ -1,9 +1,9 @@
 """The bytes on the wire are the ones of 0.8.0: ten messages of each kind, both ways."""
 
 import pytest
+from steerclear.shield.bridge.autopilot_parameters import ASKED
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.frame import FieldFrame
-from steerclear.shield.bridge.link_checks import ASKED
 from steerclear.shield.bridge.mavlink.connection import Endpoint
 from steerclear.shield.bridge.mavlink.vehicle import MavlinkLink
 from wire_bytes import kept, read_of, sent_by
