@@ -1,6 +1,8 @@
 """What imports what: no circles, and ``shield/`` nothing of the rest."""
 
 import ast
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -99,3 +101,13 @@ def test_a_stand_in_has_what_others_import_of_what_it_stands_for(place, stand_in
         known |= {one.id for one in targets if isinstance(one, ast.Name)}
     module = "steerclear.shield." + place.removesuffix(".py").replace("/", ".")
     assert imported_names(module) <= known
+
+
+SLOW = ("scipy.stats", "scipy.optimize", "pandas", "qpsolvers", "matplotlib", "torch")
+"""What takes a quarter of a second or more to import: whoever needs it imports it where it is used."""
+
+
+def test_commands_are_there_without_what_takes_long_to_import():
+    code = f"import sys; from steerclear.experiments.cli import build; build(); print(*{{*{SLOW}}} & {{*sys.modules}})"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
