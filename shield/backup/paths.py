@@ -205,7 +205,8 @@ def trace_path(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path
 def _at_thrust(params: Array, thrust: float, most: float, dt_s: float) -> AtThrust:
     """What hangs on the thrust alone of a step with the rudder at ``most``, percent."""
     turn, straight_mps = turn_of_rudder(params, thrust, most, dt_s), speed_of_thrust(params, thrust)
-    return AtThrust(thrust, turn, straight_mps, straight_mps * kept_share(params, most * turn / turn))
+    rudder = most * turn / turn if turn != 0.0 else most  # at no thrust nothing turns
+    return AtThrust(thrust, turn, straight_mps, straight_mps * kept_share(params, rudder))
 
 
 @lean_kernel
