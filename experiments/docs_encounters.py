@@ -137,7 +137,7 @@ def best_of(totals: Mapping[str, Cell]) -> str | None:
 def _section(title: str, seed: int, met: Met, families: Sequence[str], totals: Mapping[str, Cell]) -> Section:
     best = best_of(totals) if len(met) > 1 else None
     rows = [_row(f"**{guard}**" if guard == best else guard, one) for guard, one in totals.items()]
-    tables = [Table("", ["guard", *COLUMNS], rows)]
+    tables = [Table("", ["filter", *COLUMNS], rows)]
     if len(met) == 1:
         (cells,) = met.values()
         rows = [_row(family, cells[family]) for family in families]

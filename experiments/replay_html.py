@@ -11,6 +11,7 @@ reader.
 from __future__ import annotations
 
 import base64
+import json
 import os
 import zlib
 from collections.abc import Mapping, Sequence
@@ -20,7 +21,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from steerclear.env.record import Record, read_meta, save, validate
+from steerclear.env.record import Record, find_breaches, read_meta, save, validate
 from steerclear.env.render import Arena
 from steerclear.shield.exceptions import ConfigError
 
@@ -156,7 +157,8 @@ def write_replay(
     """Write a replay of one record or several.
 
     Several games can be chosen from a list and shown side by side, scrubbed together; the first two are shown
-    at the start. A link to ``replay.html#t=12.5`` opens it at that time.
+    at the start. Games without a shield count hits at the radius that the shield of another keeps. A link to
+    ``replay.html#t=12.5`` opens it at that time.
 
     Raises:
         TraceError: a record is incomplete.
@@ -165,12 +167,27 @@ def write_replay(
     games = [records] if isinstance(records, Mapping) else list(records)
     if not games:
         raise ConfigError("there is no record to replay; pass at least one.")
+    games = at_one_radius(games)
     metas = [read_meta(game) for game in games]
     own, names = {"own_team": own_team(metas)}, [game_title(meta) for meta in metas]
     titles = [name if names.count(name) == 1 else f"{k}. {name}" for k, name in enumerate(names, start=1)]
     packed = [pack(game, name) | own for game, name in zip(games, titles, strict=True)]
     data = as_json({"games": packed})
     return write_page(path, render("replay.html", title=title, data=data, scripts=SCRIPTS, sources=SCRIPT_SOURCES))
+
+
+def at_one_radius(records: Sequence[Record]) -> list[Record]:
+    """The records, those without a shield at the radius that the shields of the others keep, if that is larger."""
+    kept_m = [meta["separation_m"] for meta in map(read_meta, records) if meta["shielded"]]
+    found = []
+    for record in records:
+        meta = read_meta(record)
+        if kept_m and not meta["shielded"] and meta["separation_m"] < max(kept_m):
+            breaches = find_breaches(record["position"], max(kept_m))
+            shown = json.dumps({**meta, "separation_m": max(kept_m)})
+            record = {**record, "meta": np.array(shown), "breaches": breaches}
+        found.append(record)
+    return found
 
 
 def own_team(metas: Sequence[Mapping[str, Any]]) -> int:

@@ -140,6 +140,8 @@ LONGEST_MINUTES = 120.0
 """Room for so long a log is asked for when no end is given."""
 LONGEST_WAIT_S, FASTEST = 3600.0, 1000.0
 """Nobody means to wait longer for boats, or simulates them faster: more is a slip of the keyboard."""
+RENAMED_CHECKS = {"certificate": "backup"}
+"""Names that ``--accept`` took until 0.9, and takes for one more release."""
 APART_M = 100.0
 """Boats of the rehearsal lie so far apart: only who they are counts."""
 
@@ -184,6 +186,9 @@ class Orders:
             raise ConfigError(f"boats are waited for {self.connect_s:g} s; give --wait more than 0, at most an hour")
         if not 0.0 < self.speed <= FASTEST:
             raise ConfigError(f"boats live {self.speed:g} times as fast; give --speed more than 0, at most {FASTEST:g}")
+        if RENAMED_CHECKS.keys() & {*self.accept}:
+            LOG.warning("checks are renamed: %s", ", ".join(f"{old} is {new}" for old, new in RENAMED_CHECKS.items()))
+            object.__setattr__(self, "accept", tuple(RENAMED_CHECKS.get(name, name) for name in self.accept))
 
 
 @dataclass

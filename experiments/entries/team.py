@@ -69,7 +69,7 @@ class EntryProcess:
         """Give an order and wait for the answer."""
         worker = self._worker
         if worker is None:
-            raise Lost("it is gone")
+            raise Lost("its process is no longer running")
         try:
             worker.send(pickle.dumps(order, pickle.HIGHEST_PROTOCOL))
             return _content(self._answer(worker, timeout_s))

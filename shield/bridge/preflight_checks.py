@@ -135,10 +135,10 @@ def check_known(fleet: FleetFile, tracker: Tracker, obstacles: StaticObstacles) 
     contradicted = [f"{name}: {tracker.contradicted(name)}" for name in fleet.names if tracker.contradicted(name)]
     where = ", ".join(missing)
     return found(
-        f"all {len(fleet.names)} boats seen, oldest fix {oldest:.2f} s",
+        f"every boat seen ({len(fleet.names)}), oldest fix {oldest:.2f} s",
         {"oldest_s": oldest},
         (contradicted, f"sources contradict each other, {'; '.join(contradicted)}"),
-        (missing, f"where {where}; check telemetry and feed, or take boats that are not there out of the file"),
+        (missing, f"{where}; check telemetry and feed, or take boats that are not there out of the file"),
     )
 
 
@@ -157,8 +157,8 @@ def check_geofence(fleet: FleetFile, tracker: Tracker, obstacles: StaticObstacle
     )
 
 
-def check_certificate(fleet: FleetFile, tracker: Tracker, obstacles: StaticObstacles) -> Found:
-    """Each boat of ours has a backup now: its certificate is not negative when told to stop."""
+def check_backup(fleet: FleetFile, tracker: Tracker, obstacles: StaticObstacles) -> Found:
+    """Each boat of ours has a backup now: its safety margin is not negative when told to stop."""
     try:
         given = tracker.assemble(tracker.commanded)
         if given is None:
@@ -188,6 +188,6 @@ def check_certificate(fleet: FleetFile, tracker: Tracker, obstacles: StaticObsta
 SITUATION: Mapping[str, Callable[[FleetFile, Tracker, StaticObstacles], Found]] = {
     "known": check_known,
     "geofence": check_geofence,
-    "certificate": check_certificate,
+    "backup": check_backup,
 }
 """The checks of the situation, by name."""

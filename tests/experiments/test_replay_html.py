@@ -8,8 +8,8 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
-from steerclear.env.record import make_record, read_meta
-from steerclear.experiments.replay_html import SCRIPTS, pack, write_replay
+from steerclear.env.record import find_breaches, make_record, read_meta
+from steerclear.experiments.replay_html import SCRIPTS, at_one_radius, pack, write_replay
 from steerclear.shield.exceptions import ConfigError, TraceError
 
 NODE = shutil.which("node")
@@ -138,6 +138,16 @@ def test_several_games_are_named_apart_and_share_one_own_team(game_record, tmp_p
     ]
     assert {game["own_team"] for game in games} == {0}
     assert {game["own_team"] for game in games_in(write_replay([off, red], tmp_path / "b.html"))} == {1}
+
+
+def test_a_game_without_a_shield_counts_hits_at_the_radius_of_the_other(game_record):
+    meta = read_meta(game_record)
+    off = {**game_record, "meta": np.array(json.dumps({**meta, "shielded": [], "separation_m": 2.5}))}
+    on = {**game_record, "meta": np.array(json.dumps({**meta, "shielded": ["agent_0"], "separation_m": 8.0}))}
+    shown, kept = at_one_radius([off, on])
+    assert (read_meta(shown)["separation_m"], kept) == (8.0, on)
+    np.testing.assert_array_equal(shown["breaches"], find_breaches(off["position"], 8.0))
+    assert at_one_radius([off]) == [off]
 
 
 def test_a_full_game_stays_small(game_meta, game_record, tmp_path):

@@ -111,7 +111,7 @@ def test_without_a_preflight_nothing_starts_and_with_one_the_boat_sails(folder):
         assert "not started: 1 checks do not pass" in said
         assert not list((folder / "logs").glob("*.mcap"))
         said = steerclear(folder, "preflight", *drive, *DRILLED)
-        for name in ("disk", "rates:blue_1", "known", "geofence", "certificate", "response:blue_1", "model:blue_1"):
+        for name in ("disk", "rates:blue_1", "known", "geofence", "backup", "response:blue_1", "model:blue_1"):
             assert f"{name}: " in said
         assert (folder / "logs" / "preflight_blue.json").exists()
         said = steerclear(folder, "deploy", *drive, "--plain", "--minutes", "0.2", "--policy", "waypoints", *DRILLED)

@@ -93,7 +93,7 @@ def test_a_run_on_simulated_boats_from_preflight_to_stopped(fleet_file, boats, e
     first = preflight(orders_of(fleet_file, accept=BUSY), Surface(seen.append))
     assert [result.text for result in first.refused] == []
     drilled = {f"{kind}:blue_1" for kind in ("course", "response", "model")}
-    assert {"disk", "known", "geofence", "certificate", *drilled} <= {r.name for r in seen}
+    assert {"disk", "known", "geofence", "backup", *drilled} <= {r.name for r in seen}
     fleet = load_fleet(fleet_file)
     with referee(fleet):
         outcome = deploy(orders_of(fleet_file, entry, minutes=0.1, accept=BUSY, begun_unix_s=86400.0))

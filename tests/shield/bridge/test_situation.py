@@ -53,8 +53,8 @@ def test_a_boat_outside_the_geofence_is_named(name):
 
 
 def test_boats_too_near_or_too_fast_to_part_are_named():
-    near = results(blue_2=(2.0, 0.0))["certificate"]
+    near = results(blue_2=(2.0, 0.0))["backup"]
     assert not near.passed
     assert "move it away" in near.text
-    fast = results(blue_1=(0.0, 0.0, math.pi / 2, 2.0), blue_2=(3.5, 0.0, 1.5 * math.pi, 2.0))["certificate"]
+    fast = results(blue_1=(0.0, 0.0, math.pi / 2, 2.0), blue_2=(3.5, 0.0, 1.5 * math.pi, 2.0))["backup"]
     assert not fast.passed
