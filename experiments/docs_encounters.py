@@ -19,7 +19,7 @@ from .tables import Table, number_text
 CONDITIONS = ("radius_m", "delay_s", "noise_m", "current_mps")
 COUNTS = ("encounters", "breached", "avoidable", "unavoidable", "not_judged", "deadlocked")
 OUTSIDE = ("started_outside", "breaches_outside")
-MEANS = ("changed_percent", "goal_time_ratio", "reversals_per_min", "decision_us")
+MEANS: tuple[str, ...] = ("changed_percent", "goal_time_ratio", "reversals_per_min", "decision_us")
 MEANS += ("never_arrived_percent", "inactive_percent")
 NEEDED = ("family", "guard", "own", "other", "seed", *CONDITIONS, *COUNTS, *OUTSIDE, *MEANS)
 NO_GUARD = "none"

@@ -69,7 +69,7 @@ def fitted(
     rows: list[dict[str, Any]], options: CloningOptions, seed: int, card: dict[str, Any]
 ) -> tuple[Chooser, list[dict[str, Any]]]:
     """A chooser fitted to rows, and its curve: cross-entropy with Adam, a fifth of the rows held out."""
-    names = Chooser.columns(rows[0]) if rows else ()
+    names = Chooser.columns(rows[0]) if rows else []
     seen = np.array([[float(row[name]) for name in names] for row in rows])
     chosen = np.array([OPTION_NAMES.index(row["option"]) for row in rows])
     rng = np.random.default_rng(seed)
