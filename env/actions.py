@@ -1,4 +1,4 @@
-"""What players may send: discrete numbers, (speed, relative heading) pairs, or names of field points."""
+"""Actions that players may send: discrete numbers, (speed, relative heading) pairs, or names of field points."""
 
 from __future__ import annotations
 
@@ -17,11 +17,16 @@ from .angles import heading_to, wrap_bearing
 from .config import GameConfig
 
 KINDS = ("discrete", "continuous", "afp")
-"""Kinds of action spaces; "afp" are the named field points."""
+"""Kinds of action spaces; "afp" are named field points."""
 
 
 def action_kinds(config: GameConfig, kind: str | Sequence[str] | Mapping[str, str]) -> dict[str, str]:
-    """Kind of each boat's action space, from one kind, one per boat, or a dict by agent id."""
+    """Return the kind of each boat's action space.
+
+    Args:
+        config: the game's settings.
+        kind: one kind for all boats, one per boat, or a dict by agent id.
+    """
     if isinstance(kind, str):
         kinds = dict.fromkeys(config.agent_ids, kind)
     elif isinstance(kind, Mapping):
@@ -39,7 +44,7 @@ def action_kinds(config: GameConfig, kind: str | Sequence[str] | Mapping[str, st
 
 
 def action_space(kind: str, max_speed_mps: float, n_points: int) -> Space[Any]:
-    """Space of one boat's actions; a field point is its number in `FieldPoints.names`, or its name."""
+    """Return the space of one boat's actions; a field point is its number in `FieldPoints.names`, or its name."""
     if kind == "discrete":
         return Discrete(len(DISCRETE))
     if kind == "afp":
@@ -48,7 +53,12 @@ def action_space(kind: str, max_speed_mps: float, n_points: int) -> Space[Any]:
 
 
 def discrete_commands(indices: np.ndarray, max_speed_mps: Array) -> Array:
-    """Commands (..., n, 2), m/s and relative deg, of discrete actions (..., n) of boats of top speeds (n,), m/s."""
+    """Return commands (..., n, 2), speed m/s and relative heading deg, of discrete actions (..., n).
+
+    Args:
+        indices: whole numbers 0..16.
+        max_speed_mps: (n,) top speeds, m/s.
+    """
     try:
         given = numbers(indices)
     except NoNumbersError:
@@ -61,10 +71,10 @@ def discrete_commands(indices: np.ndarray, max_speed_mps: Array) -> Array:
 
 
 class ActionDecoder:
-    """Turns whatever a player sends into (speed m/s, relative heading deg).
+    """Turns actions into commands: speed m/s, relative heading deg.
 
-    The kind of each action is told from its type, whatever the boat's declared space, see `shield.wrappers.actions`;
-    where "afp" is declared, whole numbers are field points.
+    An action's type decides its kind, whatever the boat's declared space, see `shield.wrappers.actions`. Where "afp" is
+    declared, whole numbers are field points.
 
     Args:
         config: the game's settings.
@@ -77,7 +87,10 @@ class ActionDecoder:
         self._names = tuple(points)
 
     def decode(self, actions: Mapping[str, Any], state: Array) -> Array:
-        """Commands (n, 2) of agent ids' actions for boats at ``state`` (n, N_STATE); a boat without an action stops."""
+        """Return commands (n, 2) of actions by agent id, for boats at ``state`` (n, N_STATE).
+
+        Boats without an action stop.
+        """
         ids = self._config.agent_ids
         check_agents(actions, ids)
         commands = np.zeros((len(ids), 2))
@@ -90,7 +103,7 @@ class ActionDecoder:
         top_mps = float(self._config.platforms[i].max_speed_mps)
 
         def to_point(name: str) -> Command:
-            """Full speed towards a named point (mirrored for red), stopping within the boat's own radius of it."""
+            """Steer at full speed for a named point (mirrored for red); stop within the boat's own radius of it."""
             point = self._points[name]
             if i >= self._config.team_size:
                 point = np.array(self._config.env_bounds_m) - point

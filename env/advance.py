@@ -1,4 +1,4 @@
-"""One decision of all games, compiled: the boats move, once or several times, and then the rules are applied."""
+"""One decision of all games, compiled: the boats move, once or several times, then the rules are applied."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from .motion import move_boats, place_boats
 from .rules import check_collisions, look_for_contacts
 
 CHUNK = 64
-"""Games handled together, rule by rule."""
+"""Games processed together, rule by rule."""
 
 
 @lean_kernel
 def begin_decision(rules: Rules, games: Games) -> None:
-    """What comes before the boats move, once their commands are known: boats recharge."""
+    """Do what precedes the boats' motion, once their commands are known: clear events, recharge boats."""
     games.events[:] = 0
     R.recharge(rules, games, 0, games.state.shape[0])
 
 
 @lean_kernel
 def move_games(rules: Rules, games: Games, commands: Array) -> None:
-    """Move all boats by one step under ``commands`` (B, n, 2), speed m/s and relative heading deg."""
+    """Move all boats by one step under ``commands`` (B, n, 2): speed m/s, relative heading deg."""
     n_games = games.state.shape[0]
     for first in range(0, n_games, CHUNK):
         last = min(first + CHUNK, n_games)
@@ -46,7 +46,7 @@ def _after_the_move(rules: Rules, games: Games, first: int, last: int) -> None:
 
 @lean_kernel
 def end_decision(rules: Rules, games: Games) -> None:
-    """What comes after the boats have moved: clocks, rules, collisions."""
+    """Do what follows the boats' motion: clocks, rules, collisions."""
     n_games = games.state.shape[0]
     for first in range(0, n_games, CHUNK):
         _after_the_move(rules, games, first, min(first + CHUNK, n_games))
@@ -54,10 +54,10 @@ def end_decision(rules: Rules, games: Games) -> None:
 
 @lean_kernel
 def advance_games(rules: Rules, games: Games, wanted: Array, commands: Array) -> None:
-    """Move all boats for a decision, after `begin_decision`, and apply the rules, over chunks that fit into the cache.
+    """Move all boats for a decision, after `begin_decision`, and apply the rules.
 
-    The first step is made under ``commands`` (B, n, 2), which is used up; in later ones the game decides anew for the
-    boats it drives, and the others obey ``wanted``.
+    Games are processed in chunks that fit into the processor's cache. The first step uses ``commands`` (B, n, 2), which
+    is overwritten. In later steps the game decides anew for game-controlled boats; the others obey ``wanted``.
     """
     n_games = games.state.shape[0]
     for first in range(0, n_games, CHUNK):
@@ -72,7 +72,7 @@ def advance_games(rules: Rules, games: Games, wanted: Array, commands: Array) ->
 
 @lean_kernel
 def follow_games(rules: Rules, games: Games, seen: Array) -> None:
-    """Apply the rules to boats that moved by themselves to ``seen`` (B, n, 4), see `motion.place_boats`."""
+    """Apply the rules to boats that something else has moved to ``seen`` (B, n, 4), see `motion.place_boats`."""
     n_games = games.state.shape[0]
     begin_decision(rules, games)
     for first in range(0, n_games, CHUNK):

@@ -9,7 +9,7 @@ from steerclear.shield.jit import lean_kernel
 
 @lean_kernel
 def wrap_bearing(angle_deg: float) -> float:
-    """Angle within one turn of zero brought into (-180, 180]: straight astern is +180, as the reference has it."""
+    """Wrap an angle in [-540, 540] into (-180, 180]; straight astern is +180, as in the reference simulator."""
     if angle_deg > 180.0:
         return angle_deg - 360.0
     if angle_deg <= -180.0:
@@ -19,7 +19,7 @@ def wrap_bearing(angle_deg: float) -> float:
 
 @lean_kernel
 def heading_to(dx: float, dy: float) -> float:
-    """Heading of the vector (dx, dy), deg in [-180, 180]; the zero vector points east, as in the reference."""
+    """Return the heading of (dx, dy), deg in [-180, 180]; the zero vector points east, as in the reference."""
     if dx == 0.0 and dy == 0.0:
         return 90.0
     return math.degrees(math.atan2(dx, dy))

@@ -1,4 +1,4 @@
-"""The arrays of B games that compiled code reads and writes, and the rules it reads."""
+"""The arrays of B games that compiled code reads and writes, and the rules that it reads."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .obstacles import Obstacles, pack_obstacles
 
 
 class Rules(NamedTuple):
-    """Everything fixed during a game, in the form compiled code takes. Units as in `GameConfig`."""
+    """Everything fixed during a game, in the form for compiled code. Units as in `GameConfig`."""
 
     n_boats: int
     team_size: int
@@ -38,8 +38,8 @@ class Rules(NamedTuple):
     capture_at_corner: bool
     untag_at_corner: bool
     corner_radius: float
-    corners: Array  # (2, 2, 2) m, by team the two corners of its side
-    corner_marks: Array  # (2, 2, 2) m, where a tagged boat is driven to
+    corners: Array  # (2, 2, 2) m, the two corners of each team's side
+    corner_marks: Array  # (2, 2, 2) m, where the game steers a tagged boat
     tag_speed_frac: float
     tag_probability: float
     max_cycles: int  # decisions of a game
@@ -61,12 +61,12 @@ class Rules(NamedTuple):
 class Games(NamedTuple):
     """State of B games of n boats; teams are 0 (blue) and 1 (red). Every array (B, ...) is changed in place.
 
-    ``state`` rows are laid out as in `steerclear.shield.platforms.layout`.
+    Rows of ``state`` are laid out as in `steerclear.shield.platforms.layout`.
     """
 
     state: Annotated[Array, "n", N_STATE]
     previous_position: Annotated[Array, "n", 2]  # m, before the last move
-    error_is_float32: Annotated[BoolArray, "n"]  # the heading controller's memory came in single precision
+    error_is_float32: Annotated[BoolArray, "n"]  # the last error of the heading controller was in single precision
     is_tagged: Annotated[BoolArray, "n"]
     is_disabled: Annotated[BoolArray, "n"]  # stopped by a power play
     has_flag: Annotated[BoolArray, "n"]
@@ -75,15 +75,15 @@ class Games(NamedTuple):
     driven: Annotated[BoolArray, "n"]  # the game, not the policy, decides the command
     tagging_cooldown_s: Annotated[Array, "n"]  # s since the last tag, up to the cool-down
     made_tag: Annotated[IntArray, "n"]  # boat tagged in this step, -1 for none
-    collisions: Annotated[IntArray, "n"]  # collisions so far, one per entry per pair
+    collisions: Annotated[IntArray, "n"]  # collisions so far; each pair counts once per entry
     touching: Annotated[BoolArray, "n", "n"]  # pairs within the sum of their radii
     new_collisions: Annotated[IntArray, "n"]  # collisions begun in this decision
-    contacts: Annotated[IntArray, "n"]  # as ``collisions``, looked for after every step: what really happened
-    contact: Annotated[BoolArray, "n", "n"]  # pairs within touch after the last step
+    contacts: Annotated[IntArray, "n"]  # like ``collisions``, but checked after every step, not once per decision
+    contact: Annotated[BoolArray, "n", "n"]  # pairs in touch after the last step
     power_start: Annotated[IntArray, 2]  # decision at which a team's power play begins, -1 for none
     power_boats: Annotated[IntArray, 2, 2]  # boats it disables: the first, and one more if it begins twice
     power_begun: Annotated[IntArray, 2]  # how often it began
-    flag_position: Annotated[Array, 2, 2]  # m
+    flag_position: Annotated[Array, 2, 2]  # how often it has begun
     flag_taken: Annotated[BoolArray, 2]  # the flag of that team is carried by an opponent
     captures: Annotated[IntArray, 2]
     grabs: Annotated[IntArray, 2]
@@ -134,7 +134,7 @@ def make_rules(config: GameConfig, field: FieldGeometry) -> Rules:
 
 
 def make_games(config: GameConfig, n_games: int) -> Games:
-    """Arrays for ``n_games`` games, zero; `starts` fills them."""
+    """Return zeroed arrays for ``n_games`` games; `starts` fills them."""
     arrays = {}
     for name, kind in get_type_hints(Games, include_extras=True).items():
         axes = [config.n_boats if axis == "n" else axis for axis in kind.__metadata__ if axis != ()]

@@ -1,4 +1,4 @@
-"""What policies written for Pyquaticus look up on the environment object, answered from the live game."""
+"""Attributes that Pyquaticus policies read from the environment object, answered from the live game."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Team(Enum):
 
 
 class TeamMap(Mapping[Any, V], Generic[V]):
-    """A pair of values, one per team, indexed by anything whose ``int`` is 0 or 1: ours, or another package's Team."""
+    """A pair of values, one per team, indexed by anything whose ``int`` is 0 or 1, such as another package's Team."""
 
     def __init__(self, blue: V, red: V) -> None:
         self._values = (blue, red)
@@ -50,17 +50,17 @@ class TeamMap(Mapping[Any, V], Generic[V]):
 
 
 def _live(name: str, kind: Callable[[Any], Any], doc: str) -> Any:
-    """A property that reads an array of game 0 when it is asked for, of the boat or team ``idx``."""
+    """Make a property that reads an array of game 0, for the boat or team ``idx``."""
     return property(lambda self: kind(getattr(self._core, name)[0, self.idx]), doc=doc)
 
 
 def _moving(column: int, doc: str) -> Any:
-    """A property that reads a column of a boat's state."""
+    """Make a property that reads a column of a boat's state."""
     return property(lambda self: float(self._core.state[0, self.idx, column]), doc=doc)
 
 
 class Player:
-    """One boat of a running game: agent ``id``, its number ``idx`` and `Team`; properties are read when asked for."""
+    """One boat of a running game: agent ``id``, number ``idx`` and `Team`. Properties read the live game."""
 
     def __init__(self, core: BatchedMctf, idx: int) -> None:
         self._core = core
@@ -80,7 +80,7 @@ class Player:
     tagging_cooldown = _live("tagging_cooldown_s", float, "Time since its last tag, s, up to the cool-down.")
 
     def get_max_speed(self) -> float:
-        """Top speed, m/s."""
+        """Return the top speed, m/s."""
         return float(self._core.max_speed_mps[self.idx])
 
 
@@ -97,7 +97,7 @@ class Flag:
 
 @dataclass
 class CircleObstacle:
-    """A circle in the water, m."""
+    """A circular obstacle, m."""
 
     radius: float
     center_point: tuple[float, float]
@@ -105,7 +105,7 @@ class CircleObstacle:
 
 @dataclass
 class PolygonObstacle:
-    """A polygon in the water, m."""
+    """A polygonal obstacle, m."""
 
     anchor_points: list[tuple[float, float]]
 
@@ -128,13 +128,13 @@ _SETTINGS = {
     "tag_on_oob": "tag_on_oob",
     "tag_on_collision": "tag_on_collision",
 }
-"""Pyquaticus' attribute -> our setting, where they are the same."""
+"""Pyquaticus' attribute -> our setting, where both mean the same."""
 
 
 class PyquaticusAttributes:
     """Attributes under Pyquaticus' names, for policies that are built with the environment object.
 
-    Constant ones are set by `_set_pyquaticus_attributes`; the rest are properties.
+    `_set_pyquaticus_attributes` sets the constant ones; the others are properties.
     """
 
     core: BatchedMctf

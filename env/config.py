@@ -28,10 +28,10 @@ CAPTURE_AT = ("own_side", "own_base", "own_corners")
 UNTAG_AT = ("own_flag", "own_corners")
 
 MOST_STEPS, MOST_BOATS = 1000, 1000
-"""Steps of a decision and boats of a team at most; a slip of the pen would make one last for hours."""
+"""Most steps of a decision, and most boats of a team. A larger number is taken for a typing error."""
 
 LONGEST_S = 1e7
-"""Games are at most this long, s: four months, far beyond any; a slip of the pen would never end."""
+"""Longest game, s: four months. A longer one is taken for a typing error."""
 
 _YES_OR_NO = ("tag_on_oob", "tag_on_collision", "default_start", "on_side_start", "shows_disabled")
 _COUNTS = {"team_size": MOST_BOATS, "max_score": None, "decision_steps": MOST_STEPS}
@@ -48,18 +48,18 @@ _NOT_NEGATIVE = {
     "oob_speed_frac": None,
     "tag_speed_frac": None,
     "tag_probability": 1.0,
-    "power_play_share": 0.5,  # two of more than half a game would not be apart
+    "power_play_share": 0.5,  # two power plays of more than half a game each would overlap
 }
-"""Numbers, and how high they may be."""
+"""Settings that are numbers >= 0, and their upper limits."""
 
 
 @dataclass(frozen=True)
 class RewardWeights:
     """Weights of the default, sparse reward of one boat in one step.
 
-    Each of the first four counts events of the own team minus the same events of the opponents, so the two
-    teams' rewards from them add up to zero; ``oob`` (boats that just left the field) and ``collision`` (new
-    collisions of this very boat) are costs and enter with a minus sign.
+    Each of the first four counts events of the own team minus the same events of the opponents, so the two teams'
+    rewards from them add up to zero. ``oob`` (boats that have just left the field) and ``collision`` (new collisions of
+    this boat) are costs and enter with a minus sign.
 
     Raises:
         ConfigError: a weight is not a finite number.
@@ -78,14 +78,14 @@ class RewardWeights:
 
 @dataclass(frozen=True)
 class GameConfig:
-    """Settings of a game. Build one with `GameConfig.preset` or name what differs from the defaults.
+    """Settings of a game. Build one with `GameConfig.preset`, or name what differs from the defaults.
 
     Attributes:
         team_size: boats per team; blue are agent_0.., red follow.
         env_bounds_m: width (x, east) and height (y, north) of the field, m.
         dt_s: length of a step, in which boats move, s.
-        decision_steps: steps that boats move by under one command, whose relative heading is held; the rules are
-            applied once, after the last.
+        decision_steps: steps under one command, whose relative heading is held; the rules are applied once, after the
+            last.
         max_time_s: length of a game, s, at most 10^7.
         max_score: captures that end the game.
         platforms: one platform (name or `Platform`) for all boats or one per boat.
@@ -93,26 +93,27 @@ class GameConfig:
         catch_radius_m: radius for tags, grabs and untagging at the own flag's home, m.
         corner_radius_m: radius around the two corners of the own side, for captures and untagging there, m.
         flag_keepout_m: own boats stay this far plus their radius from their flag while it is home, m; 0 = no keep-out.
-        flag_radius_m: radius a flag is drawn with, m.
+        flag_radius_m: radius of a drawn flag, m.
         tagging_cooldown_s: time after a tag before the same boat can tag again, s.
-        oob_speed_frac: share of top speed at which the game drives a boat that is out of bounds.
-        tag_speed_frac: share of top speed at which the game drives a tagged boat.
-        tag_probability: chance that a tag succeeds; one that fails costs the cool-down too.
+        oob_speed_frac: share of top speed at which the game steers an out-of-bounds boat.
+        tag_speed_frac: share of top speed at which the game steers a tagged boat.
+        tag_probability: chance that a tag succeeds; a failed one costs the cool-down too.
         tag_on_oob: leaving the field tags the boat.
         tag_on_collision: hitting an obstacle tags the boat.
         capture_at: "own_side" (on crossing to it), "own_base" (within the catch radius of the own flag's home) or
             "own_corners" (within ``corner_radius_m`` of a corner of the own side).
-        untag_at: "own_flag" or "own_corners", where tagged boats are driven and become free; at corners not while they
-            are out of bounds.
+        untag_at: "own_flag" or "own_corners", where the game steers tagged boats and frees them; corners do not free
+            boats that are out of bounds.
         power_play_share: share of the game for which each team, once, has a random boat disabled, 0 to 0.5; 0: never.
-        shows_disabled: observations and the global state tell which boats are disabled.
+        shows_disabled: observations and the global state contain which boats are disabled.
         blue_flag_home_m, red_flag_home_m: flag homes (x, y), m; None = 1/8 and 7/8 of the width, half the height.
         scrimmage_m: two points of the dividing line, m; None = perpendicular bisector of the flag homes.
-        default_start: fixed starts on a line before the own flag, at rest; else random positions, speeds, headings.
+        default_start: boats start at rest on a fixed line before the own flag; otherwise at random positions, speeds
+            and headings.
         on_side_start: random starts only on the own side.
         obstacles: {"circle": [(radius, (x, y)), ...], "polygon": [((x, y), ...), ...]}, m.
         reward: weights of the default reward.
-        preset_name: where the settings came from, for records and reports.
+        preset_name: origin of the settings, for records and reports.
 
     Raises:
         ConfigError: a value is of the wrong kind or out of range.
@@ -190,12 +191,12 @@ class GameConfig:
 
     @property
     def n_boats(self) -> int:
-        """Boats in a game, both teams."""
+        """Number of boats in a game, both teams."""
         return 2 * self.team_size
 
     @property
     def n_obstacles(self) -> int:
-        """Obstacles in the field."""
+        """Number of obstacles in the field."""
         return 0 if self.obstacles is None else len(self.obstacles["circle"]) + len(self.obstacles["polygon"])
 
     @property
@@ -205,12 +206,12 @@ class GameConfig:
 
     @classmethod
     def names(cls) -> tuple[str, ...]:
-        """Names of all settings."""
+        """Return the names of all settings."""
         return tuple(entry.name for entry in dataclasses.fields(cls))
 
     @classmethod
     def build(cls, **settings: Any) -> GameConfig:
-        """A config from keyword settings, as the constructor, but a misspelt name is explained.
+        """Build a config from keyword settings; unlike the constructor, explain a misspelt name.
 
         Raises:
             ConfigError: a setting is unknown; the message names near matches.
@@ -224,7 +225,7 @@ class GameConfig:
 
     @classmethod
     def preset(cls, name: str, **overrides: Any) -> GameConfig:
-        """A named set of rules, with settings replaced at will.
+        """Return a named set of rules, with overrides.
 
         Args:
             name: "aamas2024" (the 2024 competition's paper), "mctf2025" or "mctf2026" (the configurations of the 2025
@@ -239,7 +240,7 @@ class GameConfig:
         return cls.build(**{**PRESETS[name], "preset_name": name, **overrides})
 
     def replace(self, **overrides: Any) -> GameConfig:
-        """A copy with settings replaced.
+        """Return a copy with settings replaced.
 
         Raises:
             ConfigError: a setting is unknown.
@@ -249,7 +250,7 @@ class GameConfig:
 
 
 def as_config(config: GameConfig | str | None) -> GameConfig:
-    """A `GameConfig` from itself, a preset's name, or None (the ``mctf2025`` preset).
+    """Return a `GameConfig` from itself, a preset's name, or None (the ``mctf2025`` preset).
 
     Raises:
         ConfigError: the preset is unknown or the argument is of another kind.
@@ -264,7 +265,7 @@ def as_config(config: GameConfig | str | None) -> GameConfig:
 
 
 PRESETS: dict[str, dict[str, Any]] = {
-    # Rules of the 2024 competition as its paper gives them, on Heron boats.
+    # Rules of the 2024 competition as in its paper, with Heron boats.
     "aamas2024": {
         "env_bounds_m": (80.0, 40.0),
         "platforms": "heron",

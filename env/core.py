@@ -1,4 +1,4 @@
-"""`BatchedMctf`: B games at once, compiled; the one set of rules behind every front."""
+"""`BatchedMctf`: B games at once, compiled. Every front end uses these rules."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ from .validation import check_count
 from .view import GameView, restore_game, view_game
 
 CommandFilter = Callable[["BatchedMctf", Array], Array]
-"""Stands between decision and motion: ``filter(core, commands (B, n, 2)) -> commands``; the shield's place.
+"""Filter between decision and motion, such as the shield: ``filter(core, commands (B, n, 2)) -> commands``.
 
-It is asked before every step of motion: several times a decision where a command is held for several steps.
+It is called before every step of motion: several times per decision if a command is held for several steps.
 """
 
 
 class BatchedMctf:
-    """B games of Maritime Capture the Flag, stepped together without Python in the loop.
+    """B games of Maritime Capture the Flag, stepped together in compiled code.
 
-    Boats are ordered agent_0..: blue (team 0) first, then red (team 1). The arrays of `Games`, such as ``state
-    (B, n, N_STATE)``, ``is_tagged (B, n)`` or ``time_s (B,)``, are attributes and live: `step` and `reset` change them
-    in place. So are those of n boats ``params (n, N_PARAM)``, ``team``, ``max_speed_mps``, ``agent_radius_m (n,)`` and
-    ``flag_home (2, 2)`` m.
+    Boats are ordered agent_0..: blue (team 0) first, then red (team 1). The arrays of `Games`, such as ``state (B, n,
+    N_STATE)``, ``is_tagged (B, n)`` or ``time_s (B,)``, are live attributes: `step` and `reset` change them in place.
+    Further arrays are ``params (n, N_PARAM)``, ``team``, ``max_speed_mps`` and ``agent_radius_m`` (n,) and ``flag_home
+    (2, 2)`` m.
 
     A finished game goes on when stepped; reset it with `reset(mask)`.
 
@@ -83,14 +83,14 @@ class BatchedMctf:
     if TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:
-            """Arrays of `Games`."""
+            """Return an array of `Games`."""
 
     def reset(self, mask: BoolArray | None = None, seed: int | None = None) -> np.ndarray:
         """Start games anew.
 
         Args:
             mask: (B,) bool, which games; None for all.
-            seed: new seed for those games, game b the same as with all; None goes on with each game's random numbers.
+            seed: new seed for those games, game b as in a reset of all; None continues each game's random numbers.
 
         Returns:
             Observations (B, n, n_obs) float32, normalised, of all games.
@@ -127,10 +127,10 @@ class BatchedMctf:
         return self.observe()
 
     def commands(self, actions: Array) -> Array:
-        """What each boat will obey, after the game's own decisions; sets ``driven``.
+        """Return the commands that the boats will obey, after the game's own decisions; set ``driven``.
 
         Args:
-            actions: (B, n, 2) what the policies want: speed m/s, relative heading deg.
+            actions: (B, n, 2) nominal commands of the policies: speed m/s, relative heading deg.
 
         Returns:
             New array (B, n, 2), same units.
@@ -145,8 +145,8 @@ class BatchedMctf:
     def advance(self, commands: Array) -> None:
         """Move all boats under ``commands`` (B, n, 2) for a decision and apply the rules, collisions and clocks.
 
-        Where a decision is of several steps, the game decides anew before each for the boats it drives, and the others
-        go on under the same speed and relative heading.
+        In a decision of several steps the game decides anew before each step for game-controlled boats. The others
+        continue under the same speed and relative heading.
 
         Raises:
             GameError: wrong shape, or a command is not finite or beyond `LARGEST_COMMAND`.
@@ -157,22 +157,25 @@ class BatchedMctf:
         advance_games(self.rules, self.games, given, self._commands)
 
     def start_seen(self, seen: Array) -> None:
-        """Start all games with boats that something else moves, such as real ones, where they are.
+        """Start all games with boats where they are seen. Something else moves them; they may be real.
 
         Args:
-            seen: (B, n, 4) x m, y m, heading deg, speed m/s; a boat whose x is NaN is nowhere, and out of bounds.
+            seen: (B, n, 4) x m, y m, heading deg, speed m/s; a boat whose x is NaN has no position and is out of
+                bounds.
 
         Raises:
-            GameError: wrong shape, or a value that is neither finite nor of a boat that is nowhere.
+            GameError: wrong shape, or a value that is not finite of a boat whose x is a number.
         """
         start_where_seen(self.rules, self.games, self._checked_sight(seen))
 
     def follow(self, seen: Array, dt_s: float) -> None:
-        """`advance` for boats that something else moved: the same rules in the same order, moving nothing.
+        """Apply the rules to boats that something else has moved.
+
+        It does the same as `advance`, in the same order, but moves nothing.
 
         Args:
             seen: (B, n, 4) where the boats are now, as in `start_seen`.
-            dt_s: time since the last call, s, which cool-downs and the game's clock go on by.
+            dt_s: time since the last call, s, by which cool-downs and the game's clock advance.
 
         Raises:
             GameError: see `start_seen`, or ``dt_s`` is not a time.
@@ -183,7 +186,7 @@ class BatchedMctf:
         follow_games(share(self.rules._replace(decision_s=float(dt_s))), self.games, given)
 
     def restore(self, view: GameView, game: int = 0) -> None:
-        """Make a game stand as a view of it, or of another of the same size, says: the inverse of `view`.
+        """Restore a game from a view of it, or of another game of the same size: the inverse of `view`.
 
         Raises:
             GameError: there is no such game, or the view has other boats.
@@ -194,16 +197,16 @@ class BatchedMctf:
     def step(
         self, actions: Array, command_filter: CommandFilter | None = None
     ) -> tuple[np.ndarray, Array, BoolArray, BoolArray]:
-        """One decision of all games, in one step of motion or several.
+        """Play one decision of all games, in one step of motion or several.
 
         Args:
             actions: (B, n, 2) speed m/s, relative heading deg.
-            command_filter: called with this object and the decided commands before every step of motion; what it
-                returns is obeyed.
+            command_filter: called with this object and the decided commands before every step of motion; the boats obey
+                what it returns.
 
         Returns:
-            observations (B, n, n_obs) float32 in [-1, 1], rewards (B, n), terminated (B,), truncated (B,). The
-            arrays are reused by the next step: copy what you keep.
+            observations (B, n, n_obs) float32 in [-1, 1], rewards (B, n), terminated (B,), truncated (B,). The next
+            step reuses these arrays: copy what you keep.
 
         Raises:
             GameError: see `commands` and `advance`.
@@ -228,7 +231,7 @@ class BatchedMctf:
 
     @contextmanager
     def _power_plays(self) -> Iterator[None]:
-        """Begin and end power plays; undone if what is inside fails: then the decision has not begun."""
+        """Begin and end power plays; undo that on an exception inside, since the decision has then not begun."""
         before = self.is_disabled.copy(), self.games.power_begun.copy()
         toggle_power_plays(self.rules, self.games)
         try:
@@ -238,16 +241,16 @@ class BatchedMctf:
             raise
 
     def observe(self) -> np.ndarray:
-        """Observations (B, n, n_obs) float32, normalised; the array is reused."""
+        """Return observations (B, n, n_obs) float32, normalised; the array is reused."""
         observe_games(self.rules, self.games, self._middle, self._scale, self._raw, self.observations)
         return self.observations
 
     def view(self, game: int = 0) -> GameView:
-        """A frozen copy of one game."""
+        """Return a frozen copy of one game."""
         return view_game(self.config, self.rules, self.games, game)
 
     def _checked(self, what: str, values: Any) -> Array:
-        """Actions or commands (B, n, 2), finite and not so large that the motion would overflow."""
+        """Return actions or commands (B, n, 2) as an array; refuse non-finite ones and those that overflow the motion."""
         shape = self._commands.shape
         try:
             array = numbers(values)

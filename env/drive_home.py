@@ -1,7 +1,7 @@
-"""Which boats the game itself drives, and where to: what every boat will obey, decided before anything moves.
+"""Commands that every boat will obey, decided before anything moves; the game itself steers some boats.
 
-A tagged boat drives straight to its own flag's home, or to the nearer corner of its side, past obstacles as `detour`
-has it; a boat out of bounds drives straight off the nearest edge; a disabled one coasts.
+The game steers a tagged boat straight to its own flag's home, or to the nearer corner of its side, and past obstacles
+in the way. It steers an out-of-bounds boat straight off the nearest edge. It stops the engine of a disabled boat.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .obstacles import Obstacles, closest_on_segment, distance_and_heading, touc
 
 @lean_kernel
 def heading_into_field(size: Array, x: float, y: float) -> float:
-    """Heading perpendicular to the edge nearest to (x, y), pointing inwards, deg."""
+    """Return the heading perpendicular to the edge nearest to (x, y), pointing inwards, deg."""
     over_x = max(0.0, -x, x - size[0])
     over_y = max(0.0, -y, y - size[1])
     south = math.hypot(y, over_x)
@@ -38,7 +38,7 @@ def heading_into_field(size: Array, x: float, y: float) -> float:
 
 @lean_kernel
 def nearer_mark(marks: Array, x: float, y: float) -> int:
-    """Which of two marks (2, 2), m, is nearer to (x, y): 0 or 1, and 0 where both are as near."""
+    """Return which of two marks (2, 2), m, is nearer to (x, y): 0 or 1; 0 on a tie."""
     first = math.sqrt((marks[0, 0] - x) ** 2 + (marks[0, 1] - y) ** 2)
     second = math.sqrt((marks[1, 0] - x) ** 2 + (marks[1, 1] - y) ** 2)
     return 1 if second < first else 0
@@ -46,7 +46,7 @@ def nearer_mark(marks: Array, x: float, y: float) -> int:
 
 @lean_kernel
 def _drive(rules: Rules, games: Games, b: int, i: int, command: Array) -> None:
-    """Command of a boat that is tagged or out of bounds: speed m/s, relative heading deg."""
+    """Command a boat that is tagged or out of bounds: speed m/s, relative heading deg."""
     x, y = games.state[b, i, L.X], games.state[b, i, L.Y]
     if games.is_tagged[b, i]:
         home = rules.flag_home[rules.team[i]]
@@ -68,7 +68,7 @@ def _drive(rules: Rules, games: Games, b: int, i: int, command: Array) -> None:
 
 @lean_kernel
 def decide_boat(rules: Rules, games: Games, actions: Array, commands: Array, b: int, i: int) -> None:
-    """What one boat will obey; fills its row of ``commands``, and ``games.driven``."""
+    """Fill one boat's row of ``commands`` with what it will obey, and ``games.driven``."""
     state = games.state[b, i]
     games.driven[b, i] = True
     on_obstacle = rules.obstacles.bounds.shape[0] > 0 and touches_obstacle(
@@ -81,14 +81,14 @@ def decide_boat(rules: Rules, games: Games, actions: Array, commands: Array, b: 
         _drive(rules, games, b, i, commands[b, i])
     else:
         games.driven[b, i] = False
-        # the reference hands policies' commands to the autopilot in single precision
+        # the reference passes policies' commands to the autopilot in single precision
         commands[b, i, 0] = np.float32(actions[b, i, 0])
         commands[b, i, 1] = np.float32(actions[b, i, 1])
 
 
 @lean_kernel
 def decide_games(rules: Rules, games: Games, actions: Array, commands: Array, first: int, last: int) -> None:
-    """`decide_commands` of the games first..last-1."""
+    """Run `decide_commands` for the games first..last-1."""
     for b in range(first, last):
         for i in range(rules.n_boats):
             decide_boat(rules, games, actions, commands, b, i)
@@ -96,27 +96,27 @@ def decide_games(rules: Rules, games: Games, actions: Array, commands: Array, fi
 
 @lean_kernel
 def decide_commands(rules: Rules, games: Games, actions: Array, commands: Array) -> None:
-    """What every boat will obey, ``commands`` (B, n, 2), where policies want ``actions``: m/s, relative heading deg.
+    """Fill ``commands`` (B, n, 2) with what the boats will obey; ``actions`` are the policies' nominal commands.
 
-    Of the games only ``driven`` is written.
+    Units are m/s and relative heading deg. Of the games only ``driven`` is written.
     """
     decide_games(rules, games, actions, commands, 0, games.state.shape[0])
 
 
 CLEARANCE_M = 1.0
-"""How much wider than its radius a boat passes an obstacle."""
+"""Distance beyond its radius at which a boat passes an obstacle."""
 
 
 @kernel
 def _side_of(segment: Array, x: float, y: float) -> float:
-    """Positive left of a segment's line, negative right of it."""
+    """Return a positive number left of a segment's line, a negative one right of it."""
     along_x, along_y = segment[1, 0] - segment[0, 0], segment[1, 1] - segment[0, 1]
     return along_x * (y - segment[0, 1]) - along_y * (x - segment[0, 0])
 
 
 @kernel
 def _gap(one: Array, two: Array) -> float:
-    """Distance between two segments (2, 2), m; 0 when they cross."""
+    """Return the distance between two segments (2, 2), m; 0 if they cross."""
     crosses_one = _side_of(one, two[0, 0], two[0, 1]) * _side_of(one, two[1, 0], two[1, 1]) < 0.0
     crosses_two = _side_of(two, one[0, 0], one[0, 1]) * _side_of(two, one[1, 0], one[1, 1]) < 0.0
     if crosses_one and crosses_two:
@@ -132,7 +132,7 @@ def _gap(one: Array, two: Array) -> float:
 
 @kernel
 def _is_in_the_way(obstacles: Obstacles, number: int, way: Array, room_m: float) -> bool:
-    """Whether the straight ``way`` (2, 2) passes an obstacle closer than ``room_m``."""
+    """Return whether the straight ``way`` (2, 2) passes an obstacle closer than ``room_m``."""
     n_circles = obstacles.circles.shape[0]
     if number < n_circles:
         centre_x, centre_y = obstacles.circles[number, 1], obstacles.circles[number, 2]
@@ -147,13 +147,13 @@ def _is_in_the_way(obstacles: Obstacles, number: int, way: Array, room_m: float)
 
 @kernel
 def _half_angle(radius_m: float, distance_m: float) -> float:
-    """Half the angle under which a circle is seen, deg; 90 from inside."""
+    """Return half the angle under which a circle is seen, deg; 90 from inside."""
     return 90.0 if distance_m <= radius_m else math.degrees(math.asin(radius_m / distance_m))
 
 
 @kernel
 def _extent(obstacles: Obstacles, number: int, x: float, y: float, room_m: float) -> tuple[float, float, float]:
-    """Heading to an obstacle's middle and how far it reaches to the left (< 0) and right (> 0) of that, deg."""
+    """Return the heading to an obstacle's middle, and how far it extends left (< 0) and right (> 0) of it, deg."""
     bounds = obstacles.bounds[number]
     middle = heading_to(bounds[0] - x, bounds[1] - y)
     n_circles = obstacles.circles.shape[0]
@@ -173,7 +173,7 @@ def _extent(obstacles: Obstacles, number: int, x: float, y: float, room_m: float
 
 @kernel
 def heading_past_obstacles(obstacles: Obstacles, radius_m: float, x: float, y: float, goal: Array) -> float:
-    """Heading, deg, for a boat of that radius at (x, y) to a goal (x, y); not brought into half a turn either way."""
+    """Return the heading, deg, for a boat at (x, y) to a goal (x, y) past obstacles. It is not wrapped."""
     straight = heading_to(goal[0] - x, goal[1] - y)
     if x == goal[0] and y == goal[1]:
         return straight

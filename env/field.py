@@ -12,12 +12,12 @@ from steerclear.shield.jit import Array
 from .config import GameConfig
 
 ROWS = ("B", "F", "H", "M", "C", "MX", "HX", "FX", "BX")
-"""Rows of named points from the blue end (x = 0) to the red end; "X" marks the opponent's half as blue sees it."""
+"""Rows of named points from the blue end (x = 0) to the red end; "X" marks the opponent's half as seen by blue."""
 COLUMNS = ("PP", "P", "C", "S", "SS")
-"""Columns from port (y = height) to starboard (y = 0), as seen from the blue end."""
+"""Columns of named points from port (y = height) to starboard (y = 0), as seen from the blue end."""
 
 CORNER_INSET_M = 10.0
-"""How far inside of a corner, along both edges, the point is that tagged boats are driven to, m."""
+"""Distance from a corner, along both edges, of the point that tagged boats are steered to."""
 
 
 @dataclass(frozen=True)
@@ -28,14 +28,18 @@ class FieldGeometry:
     diagonal: float  # length of the diagonal
     flag_home: Array  # (2, 2) homes of the blue and the red flag
     scrimmage: Array  # (2, 2) ends of the dividing line
-    # (2, 4, 2, 2) per team its four walls as segments; wall 1 is the one behind the own flag, then round the field
-    # the same way for both teams, so that both see the same picture
+    # (2, 4, 2, 2) the four walls of each team, as segments. Wall 1 is behind the own flag; the others follow round the
+    # field in the same direction for both teams, so that both see the same picture.
     walls: Array
     side_sign: Array  # (2,) sign of the cross product (line x point) on each team's side
 
 
 def field_geometry(config: GameConfig) -> FieldGeometry:
-    """Geometry of a config's field; a flag outside, or not parted from the other, is a `ConfigError`."""
+    """Return the geometry of a config's field.
+
+    Raises:
+        ConfigError: a flag is outside the field, or the dividing line does not part the flags.
+    """
     size = np.array(config.env_bounds_m)
     homes = _flag_homes(config, size)
     scrimmage = _scrimmage(config, size, homes)
@@ -48,17 +52,17 @@ def field_geometry(config: GameConfig) -> FieldGeometry:
 
 
 def own_corners(size: Array, inset_m: float) -> Array:
-    """The two corners of each team's side, upper first, moved inwards along both edges: (2, 2, 2), m."""
+    """Return the two corners of each team's side, upper first, moved inwards along both edges: (2, 2, 2), m."""
     (left, low), (right, high) = (inset_m, inset_m), size - inset_m
     return np.array([[[left, high], [left, low]], [[right, high], [right, low]]])
 
 
 def field_points(size: Array) -> dict[str, Array]:
-    """The named points of the 9 x 5 grid in blue's naming, name -> (x, y) m."""
+    """Return the named points of the 9 x 5 grid in blue's naming, name -> (x, y) m."""
     points = {}
     for i, row in enumerate(ROWS):
         for j, column in enumerate(COLUMNS):
-            # the middle column of a row is named by one letter, and row C carries its name once: PC, CC, SC
+            # the middle column is named by one letter, so row C has its letter once: PC, CC, SC
             points[column + row] = np.array([i / 8.0, (4 - j) / 4.0]) * size
     return points
 
@@ -80,7 +84,7 @@ def _flag_homes(config: GameConfig, size: Array) -> Array:
 
 
 def line_through_field(size: Array, point: Array, direction: Array) -> Array:
-    """The two points (2, 2) where a line leaves the field: first along ``direction``, then against it."""
+    """Return the two points (2, 2) where a line leaves the field: first along ``direction``, then against it."""
     low, high = -math.inf, math.inf
     for axis in (0, 1):
         if direction[axis] == 0.0:
@@ -106,7 +110,7 @@ def _scrimmage(config: GameConfig, size: Array, homes: Array) -> Array:
 
 
 def _walls_of_team(size: Array, homes: Array, team: int) -> Array:
-    """Four segments, counted so that number 1 is the wall a ray from midfield through the own flag meets."""
+    """Return four segments, numbered so that a ray from midfield through the own flag meets number 1."""
     width, height = size
     upper_left, upper_right = (0.0, height), (width, height)
     lower_right, lower_left = (width, 0.0), (0.0, 0.0)

@@ -1,4 +1,4 @@
-"""Infos of a step: raw observations and the global state as dicts, keyed as Pyquaticus keys them."""
+"""Infos of a step: raw observations and the global state as dicts with Pyquaticus' keys."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ BOOLEAN_ENTRIES = frozenset(
 
 
 class InfoWriter:
-    """Writes ``infos`` of game 0 of ``core``."""
+    """Writes the ``infos`` of game 0 of ``core``."""
 
     def __init__(self, core: BatchedMctf) -> None:
         self._core = core
@@ -39,17 +39,17 @@ class InfoWriter:
         self._global = np.zeros(len(low))
 
     def raw_observations(self) -> Array:
-        """Raw observations (n, n_obs); the array is reused."""
+        """Return raw observations (n, n_obs); the array is reused."""
         observe_raw(self._core.rules, self._core.games, self._raw, 0, 1)
         return self._raw[0]
 
     def global_vector(self) -> Array:
-        """Raw global state (n_global,); the array is reused."""
+        """Return the raw global state (n_global,); the array is reused."""
         describe_game(self._core.rules, self._core.games, 0, self._global)
         return self._global
 
     def infos(self) -> dict[str, dict[str, Any]]:
-        """Infos by agent id; all agents share one global state dict."""
+        """Return infos by agent id; all agents share one global state dict."""
         state = self.global_state.named(self.global_vector())
         for key in self._global_booleans:
             state[key] = state[key] != 0.0
@@ -67,15 +67,16 @@ def _is_boolean(key: Key) -> bool:
 
 
 class VectorNormalizer:
-    """Order, sizes and bounds of a vector's entries. Methods are named as Pyquaticus' policies call them.
+    """Order, sizes and bounds of a vector's entries. Methods have the names that Pyquaticus' policies call.
 
     Args:
         keys: names of the entries, in order.
-        sizes: how many numbers each takes.
+        sizes: how many numbers each entry has.
         low: (n,) lower bounds.
         high: (n,) upper bounds.
 
-    ``is_angle`` (n,) tells which numbers are angles in deg: there, both bounds are one direction.
+    Attributes:
+        is_angle: (n,) bool, which numbers are angles in deg; their two bounds are the same direction.
     """
 
     def __init__(self, keys: Sequence[Key], sizes: Sequence[int], low: Array, high: Array) -> None:
@@ -88,27 +89,27 @@ class VectorNormalizer:
         self.unnormalized_space = Box(low.astype(np.float32), high.astype(np.float32), dtype=np.float32)
 
     def flattened(self, entries: Mapping[Key, Any]) -> np.ndarray:
-        """Raw vector (n,) float32 of a dict with every entry."""
+        """Return the raw vector (n,) float32 of a dict with every entry."""
         missing = [key for key in self.keys if key not in entries]
         if missing:
             raise GameError(f"entries are missing: {missing[:5]}; give all {len(self.keys)}")
         return np.concatenate([np.ravel(entries[key]) for key in self.keys]).astype(np.float32)
 
     def normalized(self, entries: Mapping[Key, Any]) -> np.ndarray:
-        """Vector (n,) float32 in [-1, 1] of a dict with every entry."""
+        """Return the vector (n,) float32 in [-1, 1] of a dict with every entry."""
         raw = self.flattened(entries).astype(np.float64)
         half = 0.5 * (self.high - self.low)
         return np.clip((raw - 0.5 * (self.high + self.low)) / half, -1.0, 1.0).astype(np.float32)
 
     def unnormalized(self, vector: Any) -> dict[Key, Any]:
-        """Entries of a normalised vector (n,); entries of one number as floats, positions as (2,) arrays."""
+        """Return the entries of a normalised vector (n,); single numbers as floats, positions as (2,) arrays."""
         values = np.asarray(vector, dtype=np.float64)
         if values.shape != self.low.shape:
             raise GameError(f"the vector has shape {values.shape}; give {self.low.shape}")
         return self.named(0.5 * (self.high - self.low) * values + 0.5 * (self.high + self.low))
 
     def named(self, raw: Array) -> dict[Key, Any]:
-        """Entries of a raw vector (n,)."""
+        """Return the entries of a raw vector (n,)."""
         values = raw.tolist()
         return {
             key: values[end - 1] if size == 1 else np.array(raw[end - size : end])
@@ -117,10 +118,10 @@ class VectorNormalizer:
 
 
 N_BOAT = 11
-"""Numbers per boat, before ``is_disabled``, where it is told, and obstacles."""
+"""Numbers per boat, without ``is_disabled`` (where shown) and obstacles."""
 
 SCRIMMAGE = 4
-"""Which of the sight lines is the dividing line."""
+"""Number of the dividing line among the sight lines."""
 
 BOAT_ENTRIES = (
     "pos",
@@ -139,7 +140,7 @@ TEAM_ENTRIES = ("blue_flag_pickup", "red_flag_pickup", "blue_team_score", "red_t
 
 
 def global_state_keys(config: GameConfig) -> tuple[Key, ...]:
-    """Names of the global state's entries, in order; positions take two numbers."""
+    """Return the names of the global state's entries, in order; positions have two numbers."""
     keys: list[Key] = []
     for agent_id in config.agent_ids:
         keys += [(agent_id, entry) for entry in BOAT_ENTRIES]
@@ -172,7 +173,7 @@ def _describe_boat(rules: Rules, games: Games, b: int, i: int, out: Array) -> No
 
 @lean_kernel
 def describe_game(rules: Rules, games: Games, b: int, out: Array) -> None:
-    """Raw global state of game ``b`` into ``out`` (n_global,)."""
+    """Write the raw global state of game ``b`` into ``out`` (n_global,)."""
     width = N_BOAT + int(rules.shows_disabled) + 2 * rules.obstacles.bounds.shape[0]
     for i in range(rules.n_boats):
         _describe_boat(rules, games, b, i, out[i * width : (i + 1) * width])

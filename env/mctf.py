@@ -1,4 +1,4 @@
-"""`MctfEnv`: the game as a PettingZoo ``ParallelEnv``, a thin front over `BatchedMctf` with one game."""
+"""`MctfEnv`: the game as a PettingZoo ``ParallelEnv``, a thin layer over `BatchedMctf` with one game."""
 
 from __future__ import annotations
 
@@ -32,21 +32,21 @@ RESET_OPTIONS = ("init_dict",)
 
 
 class MctfEnv(PyquaticusAttributes, ParallelEnv[str, np.ndarray, Any]):
-    """Maritime Capture the Flag for policies written to PettingZoo or to Pyquaticus.
+    """Maritime Capture the Flag for policies written for PettingZoo or Pyquaticus.
 
-    Observations are normalised float32 vectors; ``infos[agent]["global_state"]`` and ``["unnorm_obs"]`` are dicts keyed
-    as in Pyquaticus. A boat without an action stops. ``agents`` is empty once the game is over. Scores, positions and
+    Observations are normalised float32 vectors. ``infos[agent]["global_state"]`` and ``["unnorm_obs"]`` are dicts with
+    Pyquaticus' keys. A boat without an action stops. ``agents`` is empty once the game is over. Scores, positions and
     the rest are in ``core`` (a `BatchedMctf` with one game) and in `view`.
 
     Args:
         config: a `GameConfig` or a preset's name; None is the ``mctf2025`` preset.
         render_mode: None, "human" (a window) or "rgb_array".
         action_kind: kind of action space ("discrete", "continuous" or "afp"), one for all, one per boat, or a dict by
-            agent id. Actions of every kind are understood whatever is declared.
-        reward: None for the sparse default (weights in the config) or a function of agent id and the views before
-            and after the step.
-        command_filter: see ``env.command_filter``: called with ``core`` and the decided commands (1, n, 2) before
-            the boats move; the shield's place.
+            agent id. Actions of every kind are accepted, whatever is declared.
+        reward: None for the sparse default (weights in the config), or a function of agent id and the views before and
+            after the step.
+        command_filter: see `CommandFilter`: called with ``core`` and the decided commands (1, n, 2) before the boats
+            move. A shield may be given here.
         seed: seed of random starts, until `reset` gives another.
 
     Raises:
@@ -93,11 +93,11 @@ class MctfEnv(PyquaticusAttributes, ParallelEnv[str, np.ndarray, Any]):
         """The `Renderer` behind `render`, made at the first picture."""
 
     def observation_space(self, agent: str) -> Space[Any]:
-        """Space of an agent's observations: the same object at every call."""
+        """Return the space of an agent's observations: the same object at every call."""
         return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> Space[Any]:
-        """Space of an agent's actions: the same object at every call."""
+        """Return the space of an agent's actions: the same object at every call."""
         return self.action_spaces[agent]
 
     def reset(
@@ -106,7 +106,7 @@ class MctfEnv(PyquaticusAttributes, ParallelEnv[str, np.ndarray, Any]):
         """Start a game.
 
         Args:
-            seed: seed of random starts; None goes on with the present random numbers.
+            seed: seed of random starts; None continues the random numbers.
             options: {"init_dict": ...} starts from a partial state (see `steerclear.env.starts.start_from`).
 
         Returns:
@@ -130,7 +130,7 @@ class MctfEnv(PyquaticusAttributes, ParallelEnv[str, np.ndarray, Any]):
     def step(
         self, actions: Mapping[str, Any]
     ) -> tuple[dict[str, np.ndarray], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
-        """One step.
+        """Play one step.
 
         Args:
             actions: agent id -> action of any kind (see `ActionDecoder`).
@@ -162,9 +162,9 @@ class MctfEnv(PyquaticusAttributes, ParallelEnv[str, np.ndarray, Any]):
 
     @contextmanager
     def filtered(self, command_filter: CommandFilter) -> Iterator[None]:
-        """Steps taken inside pass this filter too: after `command_filter`, and after filters entered later.
+        """While inside, steps also pass this filter: after `command_filter`, and after filters entered later.
 
-        It is how a wrapper stands between decision and motion in its own steps, and in nobody else's.
+        A wrapper thereby filters commands in its own steps only.
 
         Args:
             command_filter: as ``env.command_filter``.
@@ -176,7 +176,7 @@ class MctfEnv(PyquaticusAttributes, ParallelEnv[str, np.ndarray, Any]):
             self._step_filters.pop()
 
     def _filter_of_step(self) -> CommandFilter | None:
-        """All filters of this step as one; None where there is none."""
+        """Return all filters of this step as one; None if there are none."""
         own = [] if self.command_filter is None else [self.command_filter]
         filters = [*own, *reversed(self._step_filters)]
         if len(filters) < 2:
@@ -190,23 +190,23 @@ class MctfEnv(PyquaticusAttributes, ParallelEnv[str, np.ndarray, Any]):
         return all_of_them
 
     def decode(self, actions: Mapping[str, Any]) -> Array:
-        """Commands (n, 2), speed m/s and relative heading deg, of actions of any kind; the game stays as it is.
+        """Return commands (n, 2), speed m/s and relative heading deg, of actions of any kind; the game is not changed.
 
         Raises:
-            GameError: an unknown agent or an action that is none.
+            GameError: an unknown agent or an invalid action.
         """
         return self._decoder.decode(actions, self.core.state[0])
 
     def state(self) -> np.ndarray:
-        """Raw global state vector (n_global,) float32, in the order of ``global_state_normalizer.keys``."""
+        """Return the raw global state (n_global,) float32, in the order of ``global_state_normalizer.keys``."""
         return self._info_writer.global_vector().astype(np.float32)
 
     def infos(self) -> dict[str, dict[str, Any]]:
-        """Infos by agent id of the game as it stands, as `reset` and `step` answer them."""
+        """Return infos by agent id of the game as it stands, as in `reset` and `step`."""
         return self._info_writer.infos()
 
     def view(self) -> GameView:
-        """A frozen copy of the game as it stands."""
+        """Return a frozen copy of the game as it stands."""
         return self.core.view(0)
 
     def render(self, overlay: Any = None) -> np.ndarray | None:
@@ -232,7 +232,7 @@ class MctfEnv(PyquaticusAttributes, ParallelEnv[str, np.ndarray, Any]):
             self.renderer = None
 
     def __getstate__(self) -> dict[str, Any]:
-        """What a copy is made of: the game, without its window; a copy opens one of its own at the first picture."""
+        """Return the state to copy, without the window; a copy opens its own at the first picture."""
         return {**self.__dict__, "renderer": None}
 
     def _observations(self) -> dict[str, np.ndarray]:
@@ -247,7 +247,7 @@ class MctfEnv(PyquaticusAttributes, ParallelEnv[str, np.ndarray, Any]):
 
 
 def _init_dict(options: Mapping[str, Any] | None) -> Mapping[str, Any] | None:
-    """The init_dict among reset's options; other options are reported, near misses refused."""
+    """Return the init_dict among reset's options; log unknown options and refuse near misses."""
     if options is None:
         return None
     if not isinstance(options, Mapping):

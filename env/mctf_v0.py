@@ -1,4 +1,4 @@
-"""Version 0 of the environment, in PettingZoo's fashion: ``from steerclear.env import mctf_v0``."""
+"""Version 0 of the environment, as PettingZoo names it: ``from steerclear.env import mctf_v0``."""
 
 from __future__ import annotations
 
@@ -9,5 +9,5 @@ from .mctf import MctfEnv
 
 
 def parallel_env(config: GameConfig | str | None = None, **kwargs: Any) -> MctfEnv:
-    """The game as a PettingZoo ``ParallelEnv``; arguments as `MctfEnv`."""
+    """Return the game as a PettingZoo ``ParallelEnv``; arguments as for `MctfEnv`."""
     return MctfEnv(config, **kwargs)

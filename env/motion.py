@@ -1,4 +1,4 @@
-"""Moving the boats of one game, one after another: own side, obstacle hits, dynamics, keep-out, carried flags."""
+"""Motion of the boats of one game, in boat order: own side, obstacle hits, dynamics, keep-out, carried flags."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .obstacles import touches_obstacle
 
 @lean_kernel
 def is_on_side(line: Array, side_sign: float, x: float, y: float) -> bool:
-    """Whether (x, y) lies on a team's side of the dividing line (2, 2), or on the line itself."""
+    """Return whether (x, y) lies on a team's side of the dividing line (2, 2), or on the line itself."""
     along_x, along_y = line[1, 0] - line[0, 0], line[1, 1] - line[0, 1]
     cross = along_x * (y - line[0, 1]) - along_y * (x - line[0, 0])
     return cross * side_sign >= 0.0
@@ -25,7 +25,7 @@ def is_on_side(line: Array, side_sign: float, x: float, y: float) -> bool:
 
 @lean_kernel
 def is_within(state: Array, place: Array, radius_m: float) -> bool:
-    """Whether a boat (its state row) is closer to a place (x, y) than ``radius_m``."""
+    """Return whether a boat (its state row) is closer to a place (x, y) than ``radius_m``."""
     dx, dy = state[L.X] - place[0], state[L.Y] - place[1]
     return math.sqrt(dx * dx + dy * dy) < radius_m
 
@@ -40,7 +40,7 @@ def send_flag_home(rules: Rules, games: Games, b: int, flag: int) -> None:
 
 @lean_kernel
 def drop_flag(rules: Rules, games: Games, b: int, i: int) -> None:
-    """Boat ``i`` loses the flag it may carry, which goes home."""
+    """Drop the flag that boat ``i`` may carry; it goes home."""
     if games.has_flag[b, i]:
         games.has_flag[b, i] = False
         send_flag_home(rules, games, b, 1 - rules.team[i])
@@ -48,7 +48,7 @@ def drop_flag(rules: Rules, games: Games, b: int, i: int) -> None:
 
 @lean_kernel
 def penalise_hit(rules: Rules, games: Games, b: int, i: int) -> None:
-    """What hitting an obstacle costs boat ``i``: the flag, and by the rules perhaps a tag."""
+    """Apply the cost of hitting an obstacle to boat ``i``: it loses the flag, and may be tagged by the rules."""
     if rules.tag_on_collision:
         games.is_tagged[b, i] = True
     drop_flag(rules, games, b, i)
@@ -56,7 +56,7 @@ def penalise_hit(rules: Rules, games: Games, b: int, i: int) -> None:
 
 @lean_kernel
 def bounce_off(rules: Rules, games: Games, b: int, i: int) -> None:
-    """A boat that hit an obstacle goes back, turned round and stopped, and loses the flag; its autopilot remembers."""
+    """Put a boat that hit an obstacle back, turned round, stopped and without the flag. Its autopilot's memory stays."""
     state = games.state[b, i]
     penalise_hit(rules, games, b, i)
     before = games.previous_position[b, i]
@@ -72,10 +72,10 @@ def bounce_off(rules: Rules, games: Games, b: int, i: int) -> None:
 
 @lean_kernel
 def obey(params: Array, state: Array, is_float32: bool, was_float32: bool, command: Array, dt_s: float) -> bool:
-    """Advance a boat by one step; tells whether the heading controller's error came in single precision.
+    """Advance a boat by one step; return whether the heading controller's last error is in single precision.
 
-    The reference subtracts the controller's last two errors in single precision when both reached it so; the memory is
-    shifted so that the double-precision derivative comes out the same.
+    The reference subtracts the controller's last two errors in single precision if both are in single precision. The
+    memory is shifted so that the double-precision derivative is the same.
     """
     error = command[1]
     memory = state[L.HEADING_ERROR]
@@ -90,7 +90,7 @@ def obey(params: Array, state: Array, is_float32: bool, was_float32: bool, comma
 
 @lean_kernel
 def move_boat(rules: Rules, games: Games, commands: Array, b: int, i: int) -> None:
-    """One boat's turn in a step, under its row of ``commands`` (B, n, 2): speed m/s, relative heading deg."""
+    """Move one boat by one step under its row of ``commands`` (B, n, 2): speed m/s, relative heading deg."""
     state = games.state[b, i]
     team = rules.team[i]
     x, y = state[L.X], state[L.Y]
@@ -100,7 +100,7 @@ def move_boat(rules: Rules, games: Games, commands: Array, b: int, i: int) -> No
         return
     before = games.previous_position[b, i]
     before[0], before[1] = x, y
-    # a policy's command comes in single precision; one that the game or a filter computed does not
+    # a policy's command is in single precision; one that the game or a filter has computed is not
     error = commands[b, i, 1]
     is_float32 = not games.driven[b, i] and np.float64(np.float32(error)) == error
     games.error_is_float32[b, i] = obey(
@@ -117,7 +117,7 @@ def move_boat(rules: Rules, games: Games, commands: Array, b: int, i: int) -> No
 
 @lean_kernel
 def move_boats(rules: Rules, games: Games, commands: Array, first: int, last: int) -> None:
-    """Every boat's turn in a step, in boat order, in the games first..last-1, under ``commands`` (B, n, 2)."""
+    """Move every boat by one step, in boat order, in the games first..last-1, under ``commands`` (B, n, 2)."""
     for b in range(first, last):
         for i in range(rules.n_boats):
             move_boat(rules, games, commands, b, i)
@@ -125,7 +125,7 @@ def move_boats(rules: Rules, games: Games, commands: Array, first: int, last: in
 
 @lean_kernel
 def see_boat(state: Array, seen: Array) -> None:
-    """Put what is seen of a boat, ``seen`` (4,) x m, y m, heading deg, speed m/s, into its state row."""
+    """Write ``seen`` (4,), x m, y m, heading deg, speed m/s, into a boat's state row."""
     state[L.X], state[L.Y] = seen[0], seen[1]
     state[L.HEADING] = wrap_degrees(seen[2])
     state[L.SPEED] = seen[3]
@@ -133,9 +133,15 @@ def see_boat(state: Array, seen: Array) -> None:
 
 @lean_kernel
 def place_boats(rules: Rules, games: Games, seen: Array, first: int, last: int) -> None:
-    """`move_boats` for boats that something else moves: ``seen`` (B, n, 4) x m, y m, heading deg, speed m/s, now.
+    """Do what `move_boats` does for boats that something else moves.
 
-    A boat whose position is NaN is nowhere: on no side and out of bounds.
+    Args:
+        rules: the rules.
+        games: the games.
+        seen: (B, n, 4) x m, y m, heading deg, speed m/s at this moment; a boat whose position is NaN is on no side and
+            out of bounds.
+        first: first game.
+        last: one past the last game.
     """
     has_obstacles = rules.obstacles.bounds.shape[0] > 0
     for b in range(first, last):
@@ -160,10 +166,10 @@ BUFFER_M = 0.1
 def _solve_along_x(
     x: float, y: float, slope: float, centre: Array, radius: float, forward: bool
 ) -> tuple[float, float]:
-    """Meeting point of a circle and the line of that slope through (x, y): the one with the larger x if ``forward``.
+    """Return where a circle meets the line of that slope through (x, y): the point of larger x if ``forward``.
 
-    Slope and intercept lose digits on steep lines. They are used all the same, in this order of operations,
-    because the reference does: its lost digits are part of where its boats end up.
+    Slope and intercept lose digits on steep lines. They are used in this order of operations all the same, because the
+    reference does: the lost digits are part of its boats' positions.
     """
     h, k = centre[0], centre[1]
     intercept = y - slope * x
@@ -177,7 +183,10 @@ def _solve_along_x(
 
 @lean_kernel
 def entry_point(inside: Array, before: Array, centre: Array, radius: float) -> tuple[float, float]:
-    """Where the ray from (x, y) ``inside`` through ``before`` leaves a circle, m; outwards where it did not move."""
+    """Return where the ray from (x, y) ``inside`` through ``before`` leaves a circle, m.
+
+    A boat at rest leaves it outwards, from the centre.
+    """
     x, y = inside[0], inside[1]
     to_x, to_y = before[0], before[1]
     if x == to_x and y == to_y:
@@ -195,7 +204,7 @@ def entry_point(inside: Array, before: Array, centre: Array, radius: float) -> t
 
 @lean_kernel
 def keep_out(state: Array, before: Array, centre: Array, radius: float) -> None:
-    """Put a boat that got inside the circle, from (x, y) ``before``, back onto it, with its tangential velocity."""
+    """Put a boat that entered the circle, from (x, y) ``before``, back onto it, with its tangential velocity."""
     x, y = entry_point(state[: L.Y + 1], before, centre, radius + BUFFER_M)
     heading = math.radians(state[L.HEADING])
     # single precision, as in the reference

@@ -17,9 +17,9 @@ from .config import GameConfig
 from .field import FieldGeometry
 
 OWN_STATUS = 15
-"""Where the boat's own has_flag, on_side, tagging_cooldown, is_tagged and, where it is told, is_disabled begin."""
+"""Index of the boat's own has_flag; on_side, tagging_cooldown, is_tagged and (where shown) is_disabled follow."""
 OTHER_STATUS = 4
-"""Where those of another boat begin, after the start of its numbers."""
+"""Index of those entries of another boat, relative to the start of its numbers."""
 
 Key = str | tuple[str, str]
 
@@ -36,12 +36,12 @@ OTHER_ENTRIES = (
 
 
 def name_of(key: Key) -> str:
-    """What an entry tells, whoever it is of."""
+    """Return the quantity of an entry, without the boat that it belongs to."""
     return key if isinstance(key, str) else key[1]
 
 
 def observation_keys(config: GameConfig) -> tuple[Key, ...]:
-    """Names of an observation's numbers, in order."""
+    """Return the names of an observation's numbers, in order."""
     keys: list[Key] = []
     for place in ("opponent_home", "own_home", "wall_0", "wall_1", "wall_2", "wall_3", "scrimmage_line"):
         keys += [f"{place}_bearing", f"{place}_distance"]
@@ -56,7 +56,11 @@ def observation_keys(config: GameConfig) -> tuple[Key, ...]:
 
 
 def boat_slots(config: GameConfig) -> IntArray:
-    """Where boat i's observation holds boat j, (n, n): teammates, then opponents; itself so that its status fits."""
+    """Return the index (n, n) in boat i's observation where the numbers of boat j start.
+
+    Teammates come first, then opponents. The index of boat i itself is such that its status is written to the right
+    place.
+    """
     n, size = config.n_boats, config.team_size
     own_numbers, other_numbers = (22, 9) if config.shows_disabled else (21, 8)  # scores last
     slots = np.full((n, n), OWN_STATUS - OTHER_STATUS, dtype=np.int64)
@@ -71,7 +75,7 @@ def boat_slots(config: GameConfig) -> IntArray:
 def bounds_of(
     keys: Sequence[Key], config: GameConfig, field: FieldGeometry, max_speed_mps: float
 ) -> tuple[Array, Array]:
-    """Lower and upper bounds of raw entries, each (n,); positions take two numbers."""
+    """Return lower and upper bounds of raw entries, each (n,); positions have two numbers."""
     beyond = 5.0 * float(np.max(config.agent_radius_m))
     place = ([-beyond, -beyond], [*(field.size + beyond)])
     ranges: dict[str, Any] = {
@@ -94,7 +98,7 @@ START_X, START_Y, ALONG_X, ALONG_Y, LENGTH, TO_LEFT, TO_RIGHT = range(7)
 
 
 def pack_lines(segments: Array) -> Array:
-    """Segments (k, 2, 2), m, prepared for `sight_of_line`: (k, 7)."""
+    """Prepare segments (k, 2, 2), m, for `sight_of_line`: (k, 7)."""
     rows = np.zeros((len(segments), 7))
     for row, (start, end) in zip(rows, segments, strict=True):
         length = float(np.linalg.norm(end - start))
@@ -105,16 +109,16 @@ def pack_lines(segments: Array) -> Array:
 
 @lean_kernel
 def sight_of_point(x: float, y: float, heading: float, point_x: float, point_y: float) -> tuple[float, float]:
-    """Bearing and distance of a point, from (x, y) under ``heading``."""
+    """Return bearing and distance of a point, seen from (x, y) under ``heading``."""
     dx, dy = point_x - x, point_y - y
     return wrap_bearing(heading_to(dx, dy) - heading), math.sqrt(dx * dx + dy * dy)
 
 
 @lean_kernel
 def sight_of_line(x: float, y: float, heading: float, lines: Array, k: int) -> tuple[float, float]:
-    """Bearing and distance of the closest point of packed line ``k``.
+    """Return bearing and distance of the closest point of packed line ``k``.
 
-    Abreast of the line the direction is perpendicular to it and known beforehand: no arc tangent, and exact.
+    Abreast of the line the direction is perpendicular to it and known in advance: exact and without an arc tangent.
     """
     dx, dy = x - lines[k, START_X], y - lines[k, START_Y]
     along = dx * lines[k, ALONG_X] + dy * lines[k, ALONG_Y]

@@ -1,4 +1,4 @@
-"""What boats see: the observation vector of each boat, raw and normalised.
+"""The observation vector of each boat, raw and normalised.
 
 Order and units of the numbers: see `observation_layout`.
 """
@@ -19,7 +19,7 @@ from .obstacles import distance_and_heading
 
 @lean_kernel
 def _see_field(rules: Rules, state: Array, i: int, row: Array) -> None:
-    """Flag homes, walls and the dividing line as boat ``i`` sees them."""
+    """Write flag homes, walls and the dividing line as boat ``i`` sees them."""
     x, y, heading, team = state[i, L.X], state[i, L.Y], state[i, L.HEADING], rules.team[i]
     homes, lines = rules.flag_home, rules.sight_lines[team]
     row[0], row[1] = sight_of_point(x, y, heading, homes[1 - team, 0], homes[1 - team, 1])
@@ -31,11 +31,11 @@ def _see_field(rules: Rules, state: Array, i: int, row: Array) -> None:
 
 @lean_kernel
 def _see_each_other(raw: Array, state: Array, i: int, j: int, slots: IntArray) -> None:
-    """Where boats ``i`` and ``j`` (rows of ``state``) see one another: one arc tangent for both."""
+    """Write how boats ``i`` and ``j`` (rows of ``state``) see one another, with one arc tangent for both."""
     dx, dy = state[j, L.X] - state[i, L.X], state[j, L.Y] - state[i, L.Y]
     distance = math.sqrt(dx * dx + dy * dy)
     there = heading_to(dx, dy)
-    # two boats on one point both look east, as in the reference
+    # two boats at one point see each other in the east, as in the reference
     back = there if distance == 0.0 else wrap_bearing(there + 180.0)
     at = slots[i, j]
     raw[i, at] = wrap_bearing(there - state[i, L.HEADING])
@@ -51,7 +51,7 @@ def _see_each_other(raw: Array, state: Array, i: int, j: int, slots: IntArray) -
 
 @lean_kernel
 def _see_status(rules: Rules, games: Games, b: int, i: int, seen: Array) -> None:
-    """Status of boat ``i`` into every boat's observation, its own included."""
+    """Write the status of boat ``i`` into every boat's observation, its own included."""
     for j in range(rules.n_boats):
         at = rules.slots[j, i] + OTHER_STATUS
         seen[j, at] = games.has_flag[b, i]
@@ -64,7 +64,7 @@ def _see_status(rules: Rules, games: Games, b: int, i: int, seen: Array) -> None
 
 @lean_kernel
 def see_obstacles(rules: Rules, state: Array, i: int, row: Array, at: int) -> None:
-    """Distance (less the boat's radius) and bearing of every obstacle from boat ``i``, from ``row[at]`` on."""
+    """Write distance (less the boat's radius) and bearing of every obstacle from boat ``i``, from ``row[at]`` on."""
     for k in range(rules.obstacles.bounds.shape[0]):
         distance, heading = distance_and_heading(rules.obstacles, k, state[i, L.X], state[i, L.Y])
         row[at + 2 * k] = distance - rules.agent_radius[i]
@@ -73,7 +73,7 @@ def see_obstacles(rules: Rules, state: Array, i: int, row: Array, at: int) -> No
 
 @lean_kernel
 def observe_raw(rules: Rules, games: Games, raw: Array, first: int, last: int) -> None:
-    """Raw observations of all boats of the games first..last-1 into ``raw`` (last - first, n, n_obs)."""
+    """Write raw observations of all boats of the games first..last-1 into ``raw`` (last - first, n, n_obs)."""
     status = 5 if rules.shows_disabled else 4
     scores = OWN_STATUS + status
     obstacles = scores + 2 + (OTHER_STATUS + status) * (rules.n_boats - 1)
@@ -92,7 +92,7 @@ def observe_raw(rules: Rules, games: Games, raw: Array, first: int, last: int) -
 
 @lean_kernel
 def normalise(raw: Array, middle: Array, scale: Array, out: np.ndarray) -> None:
-    """``out = clip((raw - middle) * scale, -1, 1)`` in float32; raw and out (n, n_obs)."""
+    """Compute ``out = clip((raw - middle) * scale, -1, 1)`` in float32; raw and out (n, n_obs)."""
     for i in range(raw.shape[0]):
         for k in range(raw.shape[1]):
             out[i, k] = min(1.0, max(-1.0, (raw[i, k] - middle[k]) * scale[k]))
@@ -100,7 +100,7 @@ def normalise(raw: Array, middle: Array, scale: Array, out: np.ndarray) -> None:
 
 @lean_kernel
 def observe_games(rules: Rules, games: Games, middle: Array, scale: Array, raw: Array, out: np.ndarray) -> None:
-    """Normalised observations of every game into ``out`` (B, n, n_obs) float32; ``raw`` (k, n, n_obs) is scratch."""
+    """Write normalised observations of every game into ``out`` (B, n, n_obs) float32; ``raw`` (k, n, n_obs) is scratch."""
     n_games = games.state.shape[0]
     for first in range(0, n_games, raw.shape[0]):
         last = min(first + raw.shape[0], n_games)

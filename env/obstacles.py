@@ -1,4 +1,4 @@
-"""Circles and polygons in the water: closest points and hits."""
+"""Circular and polygonal obstacles: closest points and hits."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from steerclear.shield.jit import Array, IntArray, lean_kernel
 from .angles import heading_to
 
 TOUCH_MARGIN_M = 1e-4
-"""A boat counts as touching when this much further away than its radius (guards against rounding)."""
+"""A boat touches an obstacle at this distance beyond its radius; guards against rounding."""
 
 
 class Obstacles(NamedTuple):
-    """Obstacles for compiled code: circles first, then polygons, numbered in this order."""
+    """Obstacles for compiled code, numbered with circles first, then polygons."""
 
     circles: Array  # (C, 3) radius, x, y, m
     edges: Array  # (E, 2, 2) all polygons' edges as segments, m
-    edge_start: IntArray  # (P + 1,) where each polygon's edges begin in ``edges``
+    edge_start: IntArray  # (P + 1,) index in ``edges`` where each polygon begins
     bounds: Array  # (C + P, 3) x, y, radius of a circle around each obstacle, m
 
 
 def pack_obstacles(obstacles: Mapping[str, Any] | None) -> Obstacles:
-    """Arrays of a config's (checked) obstacles."""
+    """Return the arrays of a config's (checked) obstacles."""
     circles = [] if obstacles is None else [(r, x, y) for r, (x, y) in obstacles["circle"]]
     polygons = [] if obstacles is None else [np.array(corners) for corners in obstacles["polygon"]]
     edges = [(p[i], p[(i + 1) % len(p)]) for p in polygons for i in range(len(p))]
@@ -43,7 +43,7 @@ def pack_obstacles(obstacles: Mapping[str, Any] | None) -> Obstacles:
 
 @lean_kernel
 def closest_on_segment(segment: Array, x: float, y: float) -> tuple[float, float]:
-    """Point of a segment (2, 2) closest to (x, y), m."""
+    """Return the point of a segment (2, 2) closest to (x, y), m."""
     ax, ay = segment[0, 0], segment[0, 1]
     dx, dy = segment[1, 0] - ax, segment[1, 1] - ay
     share = ((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy)
@@ -56,7 +56,7 @@ def closest_on_segment(segment: Array, x: float, y: float) -> tuple[float, float
 
 @lean_kernel
 def distance_and_heading(obstacles: Obstacles, number: int, x: float, y: float) -> tuple[float, float]:
-    """Distance from (x, y) to an obstacle's edge, m (0 or less inside a circle), and heading to it, deg.
+    """Return the distance from (x, y) to an obstacle's edge, m (0 or less inside a circle), and the heading to it, deg.
 
     The heading is that to a circle's centre or to a polygon's closest point.
     """
@@ -79,7 +79,7 @@ def distance_and_heading(obstacles: Obstacles, number: int, x: float, y: float) 
 
 @lean_kernel
 def touches_obstacle(obstacles: Obstacles, x: float, y: float, radius: float) -> bool:
-    """Whether a boat of this radius (m) at (x, y) touches any obstacle."""
+    """Return whether a boat of this radius (m) at (x, y) touches any obstacle."""
     for number in range(obstacles.bounds.shape[0]):
         distance, _ = distance_and_heading(obstacles, number, x, y)
         if distance <= radius + TOUCH_MARGIN_M:

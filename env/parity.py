@@ -27,20 +27,24 @@ BOAT_EVENTS = {
     "contacts": "contacts",
 }
 TEAM_EVENTS = {"flag_taken": "flag_taken", "captures": "captures", "grabs": "grabs", "tags": "tags"}
-"""Array of the trace -> array of `BatchedMctf`; compared exactly at every step."""
+"""Arrays of the trace -> arrays of `BatchedMctf`, compared exactly at every step."""
 
 
 def replay_trace(path: str | os.PathLike[str]) -> ParityReport:
     """Replay a recorded game, an npz file, from its first state under its actions, over its whole length.
 
     Raises:
-        TraceError: the file cannot be read, lacks an array or starts from a state the rules do not allow.
+        TraceError: the file cannot be read, lacks an array or starts from a state that the rules do not allow.
     """
     return compare(load_trace(path))
 
 
 def compare(trace: Trace) -> ParityReport:
-    """`replay_trace` of a trace that is read; a `TraceError` where the rules do not allow its start or an action."""
+    """Replay a loaded trace, see `replay_trace`.
+
+    Raises:
+        TraceError: the rules do not allow the trace's start or an action.
+    """
     core = BatchedMctf(trace.config, n_games=1, seed=0)
     writer = InfoWriter(core)
     _check_keys(trace, writer)
@@ -75,7 +79,7 @@ def _first_state(trace: Trace) -> dict[str, np.ndarray]:
 
 
 def _power_plays(meta: dict[str, Any]) -> dict[str, Any]:
-    """When the game's power plays began and which boats it drew for them, of those that came about."""
+    """Return when the game's power plays began and which boats they disabled, as far as the trace contains it."""
     plays = meta.get("power_play")
     if not plays:
         return {}
@@ -83,7 +87,7 @@ def _power_plays(meta: dict[str, Any]) -> dict[str, Any]:
     drawn: tuple[list[int], list[int]] = ([], [])
     for decision, function, _, value in meta["draws"]:
         if decision >= 0 and function == "randint":
-            # slots do not overlap: the one that began last is the one that draws
+            # slots do not overlap: the power play that began last is the one that draws
             team = max((0, 1), key=lambda side: starts[side] if starts[side] <= decision + 1 else -1)
             drawn[team].append(team * size + int(value))
     boats = [([*drawn[team], team * size] * 2)[:2] if len(drawn[team]) < 2 else drawn[team][:2] for team in (0, 1)]
@@ -91,7 +95,7 @@ def _power_plays(meta: dict[str, Any]) -> dict[str, Any]:
 
 
 def _commands(trace: Trace, core: BatchedMctf, step: int) -> Array:
-    """Commands (n, 2) of a step; discrete runs hold (action number, nan)."""
+    """Return the commands (n, 2) of a step; discrete runs hold (action number, nan)."""
     action = trace.arrays["action"][step]
     if np.isnan(action[:, 1]).all():
         return discrete_commands(action[:, 0].astype(np.int64), core.max_speed_mps)
@@ -99,7 +103,7 @@ def _commands(trace: Trace, core: BatchedMctf, step: int) -> Array:
 
 
 def _motion(trace: Trace, core: BatchedMctf, step: int) -> Iterator[tuple[str, Array]]:
-    """Differences in how boats and flags move, by name of the tolerance."""
+    """Yield differences in the motion of boats and flags, by name of the tolerance."""
     state, arrays = core.state[0], trace.arrays
     yield "position_m", np.hypot(*(state[:, [L.X, L.Y]] - arrays["position"][step]).T)
     yield "heading_deg", _turn(state[:, L.HEADING], arrays["heading"][step], 360.0)
@@ -109,7 +113,7 @@ def _motion(trace: Trace, core: BatchedMctf, step: int) -> Iterator[tuple[str, A
 
 
 def _views(trace: Trace, core: BatchedMctf, writer: InfoWriter, step: int) -> Iterator[tuple[str, Array]]:
-    """Differences in what is seen, by name of the tolerance."""
+    """Yield differences in observations and global state, by name of the tolerance."""
     arrays, angles = trace.arrays, writer.global_state.is_angle
     ours = writer.global_vector().astype(np.float32)
     yield "global_state", _difference(ours, arrays["global_state"][step], angles, 360.0)
@@ -123,13 +127,13 @@ def _views(trace: Trace, core: BatchedMctf, writer: InfoWriter, step: int) -> It
 
 
 def _difference(ours: np.ndarray, theirs: np.ndarray, is_angle: np.ndarray, full_turn: float) -> Array:
-    """Differences (..., k); angles are compared on the circle: straight astern is +180 as well as -180."""
+    """Return differences (..., k); angles on the circle, because straight astern is +180 as well as -180."""
     plain = ours.astype(np.float64) - theirs
     return np.where(is_angle, _turn(ours.astype(np.float64), theirs, full_turn), plain)
 
 
 def _turn(one: Array, two: Array, full_turn: float) -> Array:
-    """Difference of two angles, brought into half a turn either way."""
+    """Return the difference of two angles, wrapped into half a turn either way."""
     half = 0.5 * full_turn
     return (one - two + half) % full_turn - half
 
@@ -150,7 +154,7 @@ def _compare_events(trace: Trace, core: BatchedMctf, step: int) -> list[EventMis
 class Tolerances:
     """Largest deviations a replay may have; events must be exact.
 
-    Raw observations and the global state are recorded in single precision, which at 180 resolves 1.5e-5.
+    Raw observations and the global state are recorded in single precision, which resolves 1.5e-5 at 180.
     """
 
     position_m: float = 1e-6
@@ -165,7 +169,7 @@ class Tolerances:
 
 @dataclass(frozen=True)
 class EventMismatch:
-    """One event that came out differently."""
+    """An event that differs between trace and replay."""
 
     step: int  # index of the state, 0 is the start
     event: str  # array of the trace
@@ -191,15 +195,15 @@ class ParityReport:
     mismatches: tuple[EventMismatch, ...] = ()
 
     def over(self, tolerances: Tolerances | None = None) -> dict[str, float]:
-        """Deviations beyond their tolerance, by name; NaN is beyond."""
+        """Return deviations beyond their tolerance, by name; NaN is beyond."""
         limits = asdict(tolerances or Tolerances())
         return {name: getattr(self, name) for name, limit in limits.items() if not getattr(self, name) <= limit}
 
     @property
     def passed(self) -> bool:
-        """Whether every deviation is within the default tolerances and every event exact."""
+        """Whether every deviation is within the default tolerances and every event is exact."""
         return not self.over() and not self.mismatches
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values for JSON, with ``passed``."""
+        """Return plain values for JSON, with ``passed``."""
         return {**asdict(self), "passed": self.passed}

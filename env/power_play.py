@@ -1,7 +1,7 @@
 """Power plays: once in a game each team has a random boat disabled for a share of it, never both teams at once.
 
-A decision's number is the integer part of the game's accumulated time over the time of a decision, as the reference
-counts it: rounding may repeat a number, and a power play that begins at such a one begins twice, with another boat.
+As in the reference, a decision's number is the integer part of the game's accumulated time over the time of a decision.
+Rounding may repeat a number. A power play that begins at a repeated number begins twice, with another boat.
 """
 
 from __future__ import annotations
@@ -12,18 +12,18 @@ from .arrays import Games, Rules
 from .randomness import next_uniform
 
 TRIES = 10
-"""First slots tried for one that leaves room for the second."""
+"""How often to draw a first slot until the second fits beside it."""
 
 
 @lean_kernel
 def _draw_below(games: Games, b: int, count: int) -> int:
-    """A random whole number from 0 to ``count - 1``."""
+    """Draw a random whole number from 0 to ``count - 1``."""
     return min(int(next_uniform(games.rng, b) * count), count - 1)
 
 
 @lean_kernel
 def _draw_slots(rules: Rules, games: Games, b: int) -> tuple[int, int]:
-    """Two slots of ``power_length`` decisions that do not overlap: the first anywhere, the second in what it leaves."""
+    """Draw two slots of ``power_length`` decisions that do not overlap: the first anywhere, the second in the rest."""
     length, first = rules.power_length, 0
     for _ in range(TRIES):
         first = _draw_below(games, b, int(rules.max_cycles - length) + 1)
@@ -39,7 +39,7 @@ def _draw_slots(rules: Rules, games: Games, b: int) -> tuple[int, int]:
 
 @lean_kernel
 def plan_power_plays(rules: Rules, games: Games, b: int) -> None:
-    """Draw when each team's power play of game ``b`` begins and which boats it disables; none where there are none."""
+    """Draw when each team's power play of game ``b`` begins and which boats it disables, if there are power plays."""
     for team in range(2):
         games.power_start[b, team] = -1
         games.power_begun[b, team] = 0
@@ -56,7 +56,7 @@ def plan_power_plays(rules: Rules, games: Games, b: int) -> None:
 
 @lean_kernel
 def toggle_power_plays(rules: Rules, games: Games) -> None:
-    """Begin and end power plays; before anything else in a decision."""
+    """Begin and end power plays. Call this before anything else in a decision."""
     if not rules.power_length > 0.0:
         return
     for b in range(games.state.shape[0]):

@@ -1,4 +1,4 @@
-"""Settings under Pyquaticus' names, as competitors' own configuration files have them."""
+"""Settings under Pyquaticus' names, as in competitors' own configuration files."""
 
 from __future__ import annotations
 
@@ -51,31 +51,31 @@ ONLY = {
     "short_state_hist_length": (1,),
     "long_state_hist_length": (1,),
 }
-"""Settings of which this package has one value only; another one is refused rather than ignored."""
+"""Settings that have one supported value; others are refused, not ignored."""
 
 WITHOUT_EFFECT = KNOWN_SETTINGS - set(RENAMED) - set(ONLY)
-"""Settings of drawing, lidar, histories and path planning: accepted, not needed."""
+"""Settings of drawing, lidar, histories and path planning: accepted, without effect."""
 
 ONLY_2026 = frozenset({"tag_speed_frac", "tag_probability", "untag_radius", "power_play_percentage"})
 """Settings that only the environment of the 2026 competition has."""
 
 OF_2026 = {"capture_at": "own_corners", "untag_at": "own_corners", "shows_disabled": True}
-"""What that environment does without a setting."""
+"""What that environment does without any setting."""
 
 DEFAULTS = {"platforms": "heron", "flag_radius_m": 1.5}
-"""Where Pyquaticus' defaults are not ours."""
+"""Pyquaticus' defaults that differ from ours."""
 
 
 def from_pyquaticus(settings: Mapping[str, Any], team_size: int, **overrides: Any) -> GameConfig:
-    """A `GameConfig` from a Pyquaticus configuration dict.
+    """Return a `GameConfig` from a Pyquaticus configuration dict.
 
     Args:
-        settings: a configuration as Pyquaticus takes it; what is missing has Pyquaticus' default.
+        settings: a configuration as for Pyquaticus; missing settings have Pyquaticus' defaults.
         team_size: boats per team.
         **overrides: settings of `GameConfig` that take precedence.
 
     Raises:
-        ConfigError: a setting is unknown, or has a value this package cannot play.
+        ConfigError: a setting is unknown or has an unsupported value.
     """
     if not isinstance(settings, Mapping):
         raise ConfigError(f"the configuration is {type(settings).__name__}; give a dict")

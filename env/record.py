@@ -1,4 +1,4 @@
-"""Recording a game step by step; ``record_file`` describes the arrays and reads and writes them."""
+"""Recording of a game, step by step; ``record_file`` describes, reads and writes the arrays."""
 
 from __future__ import annotations
 
@@ -59,12 +59,12 @@ def meta_of(config: GameConfig, **settings: Any) -> dict[str, Any]:
 
     Args:
         config: The game's settings.
-        **settings: What the game does not know: ``separation_m``, ``policies`` {blue, red}, ``shielded`` (agent
-            ids), ``seed``, ``reason_names`` and ``title``. Those left out describe an unshielded, unnamed game.
+        **settings: What the game does not know: ``separation_m``, ``policies`` {blue, red}, ``shielded`` (agent ids),
+            ``seed``, ``reason_names`` and ``title``. Defaults describe an unshielded, unnamed game.
 
     Returns:
-        A dict with all of ``record_file.META_KEYS``, the title, the scrimmage line and the obstacles. The radius
-        is one number, or one for each boat where they differ.
+        A dict with all of ``record_file.META_KEYS``, the title, the scrimmage line and the obstacles. The radius is one
+        number, or one per boat where they differ.
 
     Raises:
         TraceError: A setting is unknown.
@@ -92,7 +92,7 @@ def meta_of(config: GameConfig, **settings: Any) -> dict[str, Any]:
 
 
 def absolute_commands(commands: np.ndarray, heading_deg: np.ndarray) -> np.ndarray:
-    """Turn commands (n, 2), speed m/s and relative heading deg, into the record's: absolute, deg in [-180, 180)."""
+    """Return commands (n, 2), speed m/s and relative heading deg, with absolute headings in [-180, 180) deg."""
     absolute = np.array(commands, dtype=np.float64)
     absolute[:, 1] = (absolute[:, 1] + heading_deg + 180.0) % 360.0 - 180.0
     return absolute
@@ -101,15 +101,15 @@ def absolute_commands(commands: np.ndarray, heading_deg: np.ndarray) -> np.ndarr
 def find_breaches(position: np.ndarray, separation_m: float) -> np.ndarray:
     """List every entry of two boats into the separation radius.
 
-    The start position itself is not counted, so a pair that starts inside counts at the first step.
+    The start position itself is not counted; a pair that starts inside counts at the first step.
 
     Args:
         position: (T+1, n, 2) positions, m.
-        separation_m: Two centres at this distance or less are a breach.
+        separation_m: Two centres at this distance or less violate the separation.
 
     Returns:
-        (K, 4) in order of time: index (1..T) of the first state inside, boat a, boat b (a < b), closest
-        distance m until the pair is apart again.
+        (K, 4) in order of time: index (1..T) of the first state inside, boat a, boat b (a < b), closest distance m
+        until the pair is apart again.
 
     Raises:
         TraceError: Another shape, or a radius that is not positive.
@@ -140,7 +140,7 @@ class GameRecorder:
         self._rows: dict[str, list[np.ndarray]] = {}
 
     def start(self, view: Any, meta: Mapping[str, Any]) -> None:
-        """Begin a new game from a ``GameView`` of it and its settings, see `meta_of`.
+        """Begin a new game from its ``GameView`` and its settings, see `meta_of`.
 
         Raises:
             TraceError: ``meta`` lacks a key.
@@ -163,11 +163,11 @@ class GameRecorder:
 
         Args:
             view: The game's state after the step.
-            wanted: (n, 2) speed m/s and absolute heading deg commanded by the policy before the step.
-            sent: (n, 2) likewise, what the boats received.
-            reason: (n,) reason codes; all ``NOT_COVERED`` when left out.
-            intervened: (n,) bool; all False when left out.
-            safety_margin_m: (n,) safety margins, m; all NaN when left out.
+            wanted: (n, 2) nominal commands before the step: speed m/s, absolute heading deg.
+            sent: (n, 2) likewise, the commands that the boats received.
+            reason: (n,) reason codes; None: all ``NOT_COVERED``.
+            intervened: (n,) bool; None: all False.
+            safety_margin_m: (n,) safety margins, m; None: all NaN.
 
         Raises:
             TraceError: ``start`` was not called, or an array has the wrong shape.
@@ -185,13 +185,11 @@ class GameRecorder:
         self._append(given | _state_of(view))
 
     def finish(self, breaches: Sequence[Sequence[float]] | np.ndarray = ()) -> Record:
-        """Close the game.
+        """Close the game and return the validated record.
 
         Args:
-            breaches: (K, 4) first step, boat a, boat b, closest distance m, as ``find_breaches`` gives.
-
-        Returns:
-            The validated record.
+            breaches: (K, 4) separation violations as from ``find_breaches``: first step, boat a, boat b, closest
+                distance m.
 
         Raises:
             TraceError: ``start`` was not called, or the arrays do not fit together.
@@ -202,7 +200,7 @@ class GameRecorder:
         return make_record(self._meta, breaches=np.array(breaches, dtype=np.float64).reshape(-1, 4), **arrays)
 
     def _append(self, given: Mapping[str, Any]) -> None:
-        """Add one row to each array named, or to none of them when one does not fit."""
+        """Add one row to each named array, or to none of them if one does not fit."""
         rows = {name: np.array(values, dtype=LAYOUT[name][1]) for name, values in given.items()}
         for name, row in rows.items():
             if row.shape != (want := self._row_shape(name)):

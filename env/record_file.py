@@ -1,25 +1,25 @@
-"""The record of a game: every array a replay, a picture or an analysis needs, in one ``.npz`` file.
+"""The record of a game: all arrays for a replay, a picture or an analysis, in one ``.npz`` file.
 
 A record is a plain dict of numpy arrays. With ``n`` boats (blue team first) and ``T`` steps:
 
-=================  ==============  =======================================================================
-array              shape           contents
-=================  ==============  =======================================================================
-``meta``           ()              JSON text, see ``META_KEYS``
-``position``       (T+1, n, 2)     m, state before step t at index t
-``heading_deg``    (T+1, n)        deg, clockwise from north
-``speed_mps``      (T+1, n)        m/s
-``has_flag``       (T+1, n)        bool; likewise ``is_tagged`` and ``oob`` (out of bounds)
-``is_disabled``    (T+1, n)        bool, stopped by a power play; older files have none
-``flag_position``  (T+1, 2, 2)     m, flag of team 0 and of team 1
-``captures``       (T+1, 2)        captures made by each team so far
-``wanted``         (T, n, 2)       speed m/s and absolute heading deg the policy asked for
-``sent``           (T, n, 2)       what the boat was told
-``reason``         (T, n)          shield reason code; ``NOT_COVERED`` where no shield decided
-``intervened``     (T, n)          bool, sent differs from wanted
+===================  ==============  =======================================================================
+array                shape           contents
+===================  ==============  =======================================================================
+``meta``             ()              JSON text, see ``META_KEYS``
+``position``         (T+1, n, 2)     m, state before step t at index t
+``heading_deg``      (T+1, n)        deg, clockwise from north
+``speed_mps``        (T+1, n)        m/s
+``has_flag``         (T+1, n)        bool; likewise ``is_tagged`` and ``oob`` (out of bounds)
+``is_disabled``      (T+1, n)        bool, stopped by a power play; older files have none
+``flag_position``    (T+1, 2, 2)     m, flag of team 0 and of team 1
+``captures``         (T+1, 2)        captures made by each team so far
+``wanted``           (T, n, 2)       nominal command: speed m/s, absolute heading deg
+``sent``             (T, n, 2)       command that the boat received
+``reason``           (T, n)          shield reason code; ``NOT_COVERED`` where no shield decided
+``intervened``       (T, n)          bool, the two commands differ
 ``safety_margin_m``  (T, n)          float32, NaN where there is none
-``breaches``       (K, 4)          index of the first state inside, boat a, boat b, closest distance m
-=================  ==============  =======================================================================
+``breaches``         (K, 4)          index of the first state inside, boat a, boat b, closest distance m
+===================  ==============  =======================================================================
 """
 
 from __future__ import annotations
@@ -57,21 +57,21 @@ LAYOUT: dict[str, tuple[tuple[str | int, ...], Any]] = {
     "safety_margin_m": (("T", "n"), np.float32),
     "breaches": (("K", 4), np.float64),
 }
-"""Per array: its axes (T steps, n boats, K breaches) and its type."""
+"""Per array: its axes (T steps, n boats, K separation violations) and its type."""
 
 ARRAYS = tuple(LAYOUT)
-"""Names of the arrays beside ``meta``."""
+"""Names of the arrays besides ``meta``."""
 
 LATER = ("is_disabled",)
-"""Those that files of older versions lack; `load` and `make_record` fill them in."""
+"""Arrays that files of older versions lack; `load` and `make_record` fill them in."""
 
 FARTHEST_M = 1e6
-"""No boat, flag or edge of a field is further from the origin."""
+"""Limit for the distance of a boat, flag or field edge from the origin."""
 
 LONGEST_STEP_S = 10.0
 MOST_BOATS = 1000
 MOST_LETTERS = 1000
-"""Of a name."""
+"""Longest name, in characters."""
 
 _AGAIN = "Record the game again with GameRecorder and save() it."
 
@@ -144,10 +144,10 @@ def make_record(meta: Mapping[str, Any], **arrays: Any) -> Record:
 
 
 def save(record: Mapping[str, np.ndarray], path: str | os.PathLike[str]) -> Path:
-    """Write a record to an ``.npz`` file; an interrupted write leaves no half file and no damaged older one.
+    """Write a record to an ``.npz`` file. An interrupted write leaves no partial file and does not damage an older one.
 
     Returns:
-        The path written, to which ``.npz`` is added when it has no such ending.
+        The path written; ``.npz`` is added if the ending is missing.
 
     Raises:
         TraceError: The record is incomplete, or the folder cannot be written to.
@@ -161,7 +161,7 @@ def save(record: Mapping[str, np.ndarray], path: str | os.PathLike[str]) -> Path
 
 
 def load(path: str | os.PathLike[str]) -> Record:
-    """Read a record that ``save`` wrote and check it.
+    """Read and check a record that ``save`` wrote.
 
     Raises:
         TraceError: The file is missing, cut, not a record, or lacks an array.
@@ -175,7 +175,7 @@ def load(path: str | os.PathLike[str]) -> Record:
 
 
 def _filled(record: Record) -> Record:
-    """The record, with what older versions did not write: no boat was disabled then."""
+    """Add the arrays that older versions did not write; no boat was disabled then."""
     return {"is_disabled": np.zeros_like(record["is_tagged"]), **record}
 
 
@@ -187,7 +187,7 @@ def plain(value: Any) -> Any:
 
 
 def _check_settings(meta: Mapping[str, Any]) -> None:
-    """Refuse settings that no game has."""
+    """Refuse settings with impossible values."""
     for name, (is_right, words) in _SETTINGS.items():
         if name in meta and not is_right(meta[name]):
             raise TraceError(f"the record's {name} is {_short(meta[name])}; it should be {words}")
@@ -265,7 +265,7 @@ _SETTINGS: dict[str, tuple[Test, str]] = {
     "platforms": (_list_of(_text), "a list of names"),
     "obstacles": (_maybe(_obstacles), "circles and polygons"),
 }
-"""Setting: what makes it right, and words for it."""
+"""Per setting: a test of its value, and words for what it should be."""
 
 META_KEYS = tuple(name for name in _SETTINGS if name not in _OPTIONAL)
-"""Keys that ``meta`` must have; further keys are kept."""
+"""Keys that ``meta`` must have; further keys are preserved."""

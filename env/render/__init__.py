@@ -1,6 +1,6 @@
 """Pictures of a game: ``Renderer`` for a live one, ``save_frame`` and ``save_animation`` for a record.
 
-Each is imported when it is asked for: what draws needs pygame (extra ``game``), films need ffmpeg (extra ``film``).
+Each is imported on first use: drawing needs pygame (extra ``game``), films need ffmpeg (extra ``film``).
 """
 
 import os
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from steerclear.shield.extras import missing
 
-os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # else importing pygame writes to standard output
+os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # otherwise importing pygame writes to standard output
 
 if TYPE_CHECKING:
     from steerclear.env.render.animation import save_animation, save_frame
@@ -27,10 +27,10 @@ _HOME = {
 
 
 def __getattr__(name: str) -> Any:
-    """One of the names, from the module that holds it.
+    """Import a name from the module that holds it.
 
     Raises:
-        ConfigError: what it draws with is not installed; the message names the extra.
+        ConfigError: a drawing package is not installed; the message names the extra.
     """
     home = next((module for module, names in _HOME.items() if name in names), None)
     if home is None:

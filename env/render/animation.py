@@ -112,7 +112,7 @@ def save_animation(
 
 
 def _picture_of(record: Mapping[str, np.ndarray], width_px: int, theme: str) -> tuple[Picture, int]:
-    """A picture for the record and the number of its states."""
+    """Return a picture for the record and the number of its states."""
     validate(record)
     return Picture(Arena.from_meta(read_meta(record)), width_px, theme), len(record["position"])
 
@@ -135,7 +135,7 @@ def _write_mp4(path: Path, frames: Iterator[np.ndarray], size_px: tuple[int, int
 
 
 def _write_gif(path: Path, frames: Iterator[np.ndarray], picture: Picture, fps: float) -> None:
-    """Write all frames with one palette, so that still water does not flicker and frames stay small."""
+    """Write all frames with one palette: still water does not flicker, and frames stay small."""
     palette = Image.new("P", (1, 1))
     palette.putpalette(_palette(picture))
     images = (Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
@@ -144,7 +144,7 @@ def _write_gif(path: Path, frames: Iterator[np.ndarray], picture: Picture, fps: 
 
 
 def _palette(picture: Picture) -> list[int]:
-    """256 colours: the theme's, the commonest of the still field, and steps between marks and water."""
+    """Return 256 colours: the theme's, the most frequent of the still field, and steps between marks and water."""
     theme = picture.theme
     marks = [*theme.team, theme.ink, theme.muted, theme.wanted, theme.changed, theme.breach]
     grounds = [*theme.water, theme.page, theme.plate]

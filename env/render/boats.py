@@ -1,4 +1,4 @@
-"""What is drawn: the field, then all that moves on it: tracks, separation discs, commands, hulls, flags."""
+"""Drawing of the field and of everything that moves on it: tracks, separation discs, commands, hulls, flags."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from steerclear.env.render.canvas import Canvas, Colour, Theme, mix
 from steerclear.env.render.scene import Arena, Pair, Scene, boats_in_breach, closest_pair
 
 LOOKAHEAD_S = 4.0
-"""Commands and speeds are drawn as the way gone in this time, s."""
+"""Commands and speeds are drawn as the distance covered in this time."""
 
 CLOSE_SEPARATIONS = 4.0
 """The closest pair is joined by a line when nearer than this many separations."""
@@ -24,7 +24,7 @@ DECK = np.array([(0.0, 0.2), (0.08, 0.02), (0.085, -0.3), (-0.085, -0.3), (-0.08
 
 
 def draw_field(canvas: Canvas, arena: Arena, theme: Theme) -> None:
-    """Draw all that does not move, on a cleared canvas."""
+    """Draw everything that does not move, on a cleared canvas."""
     width, height = arena.bounds_m
     corners = [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)]
     canvas.surface.fill(theme.page)
@@ -57,7 +57,7 @@ def draw_field(canvas: Canvas, arena: Arena, theme: Theme) -> None:
 
 
 def _draw_corners(canvas: Canvas, team: int, arena: Arena, theme: Theme) -> None:
-    """Draw where a team captures and is untagged at the corners of its side: the quarter discs inside the field."""
+    """Draw where a team captures and is untagged: quarter discs at the corners of its side."""
     radius_m, (width, height) = arena.corner_radius_m, arena.bounds_m
     angles = np.linspace(0.0, np.pi / 2.0, 19)
     x = np.abs(team * width - radius_m * np.cos(angles))
@@ -78,7 +78,7 @@ def ends_in_field(arena: Arena) -> tuple[Pair, Pair]:
 
 
 def cut_by_line(polygon: Sequence[Pair], start: Pair, end: Pair, keep: Pair) -> list[Pair]:
-    """Return the part of a convex polygon that lies on the side of a point to keep of the line start to end."""
+    """Return the part of a convex polygon on the same side of the line ``start`` to ``end`` as the point ``keep``."""
     sign = 1.0 if _side(keep, start, end) >= 0.0 else -1.0
     part: list[Pair] = []
     for here, there in zip(polygon, [*polygon[1:], polygon[0]], strict=True):
@@ -92,12 +92,12 @@ def cut_by_line(polygon: Sequence[Pair], start: Pair, end: Pair, keep: Pair) -> 
 
 
 def _side(point: Pair, start: Pair, end: Pair) -> float:
-    """A number whose sign says on which side of the line a point lies."""
+    """Return a number whose sign tells on which side of the line a point lies."""
     return (end[0] - start[0]) * (point[1] - start[1]) - (end[1] - start[1]) * (point[0] - start[0])
 
 
 def draw_boats(canvas: Canvas, scene: Scene, arena: Arena, theme: Theme, show_commands: bool = True) -> None:
-    """Draw all that moves over the field."""
+    """Draw everything that moves on the field."""
     boats = range(len(scene.position_m))
     for boat in boats:
         canvas.trail(scene.trail_m[:, boat], theme.team[arena.team[boat]], 2.0)
@@ -120,7 +120,7 @@ def draw_boats(canvas: Canvas, scene: Scene, arena: Arena, theme: Theme, show_co
 def _draw_separation(canvas: Canvas, scene: Scene, arena: Arena, theme: Theme) -> None:
     """Draw a disc of half the separation around each boat: two discs that touch violate it.
 
-    Where boats are shielded, a violation is one of theirs: for others among themselves no shield answers.
+    If any boat is shielded, only violations that involve a shielded boat are marked.
     """
     covered = {boat for boat, name in enumerate(arena.names) if name in arena.shielded}
     pairs = boats_in_breach(scene, arena.separation_m)
@@ -142,7 +142,7 @@ def along(heading_deg: float, length_m: float) -> np.ndarray:
 
 
 def command_end(start_m: np.ndarray, command: np.ndarray) -> np.ndarray:
-    """Return where a boat at ``start_m`` gets under a command in ``LOOKAHEAD_S``; the start if that is not finite."""
+    """Return where a boat at ``start_m`` gets under a command in ``LOOKAHEAD_S``; the start if it is not finite."""
     if not np.isfinite(command).all():
         return np.asarray(start_m, dtype=float)
     return start_m + along(float(command[1]), float(command[0]) * LOOKAHEAD_S)

@@ -1,6 +1,6 @@
-"""Drawing in metres with smooth edges: shapes go on an enlarged surface that is then shrunk.
+"""Drawing in metres with smooth edges: shapes are drawn on an enlarged surface, which is then shrunk.
 
-The surface is a plain memory surface, so nothing here needs a display.
+The surface is in memory, so no display is needed.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Colour = tuple[int, int, int]
 
 @dataclass(frozen=True)
 class Theme:
-    """One set of colours, red-green-blue 0..255."""
+    """A set of colours, red-green-blue 0..255."""
 
     page: Colour  # Around the field
     water: tuple[Colour, Colour]  # Field of team 0 and of team 1
@@ -32,9 +32,9 @@ class Theme:
     ink: Colour  # Text and strong marks
     muted: Colour  # Secondary text
     team: tuple[Colour, Colour]  # Team 0 and team 1
-    wanted: Colour  # Arrow of a nominal command the shield did not send
+    wanted: Colour  # Arrow of a nominal command that the shield replaced
     changed: Colour  # Arrow and halo of a command the shield changed
-    breach: Colour  # Two boats inside the separation radius
+    breach: Colour  # Two boats that violate the separation
     obstacle: Colour  # Fixed obstacles
     plate: Colour  # Behind labels
 
@@ -80,7 +80,7 @@ def mix(first: Colour, second: Colour, share: float) -> Colour:
 
 @lru_cache(maxsize=32)
 def font(size_px: int, bold: bool = False) -> pygame.font.Font:
-    """Return a typeface that is the same on every machine (the one that matplotlib brings)."""
+    """Return a typeface that is the same on every machine: the one that comes with matplotlib."""
     pygame.font.init()
     name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
     return pygame.font.Font(str(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / name), size_px)
@@ -112,7 +112,7 @@ class Canvas:
         return pygame.transform.smoothscale(self.surface, self.size_px)
 
     def polygon(self, points_m: Sequence[Point] | np.ndarray, colour: Colour, outline: Colour | None = None) -> None:
-        """Fill a polygon, with a thin outline when one is given."""
+        """Fill a polygon, with a thin outline if a colour is given."""
         points = [self._at(point) for point in points_m]
         pygame.draw.polygon(self.surface, colour, points)
         if outline is not None:
@@ -123,11 +123,11 @@ class Canvas:
         self._circle(centre_m, radius_m * self._scale, colour, opacity, 0)
 
     def ring(self, centre_m: Point, radius_m: float, colour: Colour, width_px: float, opacity: float = 1.0) -> None:
-        """Draw a circle's line."""
+        """Draw a circle's outline."""
         self._circle(centre_m, radius_m * self._scale, colour, opacity, max(1, round(width_px * OVERSAMPLE)))
 
     def dashed_ring(self, centre_m: Point, radius_m: float, colour: Colour, width_px: float, dash_px: float) -> None:
-        """Draw a circle's line in dashes."""
+        """Draw a circle's outline in dashes."""
         dashes = max(8, round(2 * math.pi * radius_m * self.scale_px_per_m / (2 * dash_px)))
         for start in np.arange(dashes) * (2 * math.pi / dashes):
             turn = np.linspace(start, start + math.pi / dashes, 6)
@@ -135,7 +135,7 @@ class Canvas:
             self.line(arc, colour, width_px)
 
     def line(self, points_m: Sequence[Point] | np.ndarray, colour: Colour, width_px: float) -> None:
-        """Draw a line through points, its ends rounded."""
+        """Draw a line through points, with rounded ends."""
         points = [self._at(point) for point in points_m]
         width = max(1.0, width_px * OVERSAMPLE)
         for start, end in pairwise(points):
@@ -167,7 +167,7 @@ class Canvas:
         self.surface.blit(layer, tuple(corner))
 
     def arrow(self, start_m: Point, end_m: Point, colour: Colour, width_px: float, edge: Colour | None = None) -> None:
-        """Draw an arrow; ``edge`` outlines it so that it stands out from what lies under it."""
+        """Draw an arrow; ``edge`` outlines it so that it stands out."""
         start, end = np.array(self._at(start_m)), np.array(self._at(end_m))
         length = float(np.linalg.norm(end - start))
         if length < 2.0:
@@ -186,7 +186,7 @@ class Canvas:
         return self._origin[0] + point_m[0] * self._scale, self._origin[1] - point_m[1] * self._scale
 
     def _circle(self, centre_m: Point, radius: float, colour: Colour, opacity: float, width: int) -> None:
-        """Draw a see-through disc, or a ring of a width > 0."""
+        """Draw a translucent disc, or a ring if ``width`` > 0."""
         x, y = self._at(centre_m)
         half = math.ceil(radius + width + 2)
         box = pygame.Rect(round(x) - half, round(y) - half, 2 * half, 2 * half)

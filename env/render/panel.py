@@ -1,4 +1,4 @@
-"""Text: at the boats, and around the field the header with score and time, and the legend."""
+"""Text: labels at the boats, the header with score and time, and the legend."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from steerclear.shield.foreign import visible
 HEADER_PX, FOOTER_PX, MARGIN_PX = 62, 40, 24
 TEXT_PX, NUMBER_PX = 13, 12
 STEERING = "you: ringed   ahead ↑ W   turn ← → A D   back ↓ S   half speed Shift   stop: no key"
-"""What the keys do, as `steerclear.policies` reads them."""
+"""The keys, as `steerclear.policies` reads them."""
 
 MOST_LETTERS = 200
-"""Of a line; what is longer fits in no picture."""
+"""Longest line, in characters; longer ones fit in no picture."""
 
 TEAM_NAMES = ("BLUE", "RED")
 _DIRECTIONS = [np.array([np.sin(turn), -np.cos(turn)]) for turn in np.radians(np.arange(0.0, 360.0, 30.0))]
@@ -31,7 +31,10 @@ def draw_text(
     bold: bool = False,
     anchor: str = "midleft",
 ) -> pygame.Rect:
-    """Write one line whose ``anchor``, one of pygame's names for points of a rectangle, lies at ``at_px``."""
+    """Write one line of text.
+
+    ``at_px`` is the place of its ``anchor``, one of pygame's names for points of a rectangle.
+    """
     image = font(size_px, bold).render(visible(text)[:MOST_LETTERS], True, colour)
     box = image.get_rect()
     setattr(box, anchor, (round(at_px[0]), round(at_px[1])))
@@ -86,7 +89,7 @@ def draw_legend(surface: pygame.Surface, arena: Arena, theme: Theme) -> None:
 
 
 def _draw_key(surface: pygame.Surface, kind: str, at_px: tuple[float, float], colour: Colour, width: int) -> None:
-    """Draw a legend's small picture, enlarged and shrunk so that its edges are smooth."""
+    """Draw a symbol of the legend, enlarged and then shrunk so that its edges are smooth."""
     big = pygame.Surface((112, 96), pygame.SRCALPHA, 32)
     big.fill((*colour, 0))
     if kind == "arrow":
@@ -108,9 +111,9 @@ class Labels:
 
     Args:
         surface: The finished picture.
-        spots_px: Where the boats are on it.
-        reach_px: How far from its spot a boat's label begins.
-        taken: Further places to keep clear.
+        spots_px: The boats' positions on it.
+        reach_px: Distance from its boat at which a label begins.
+        taken: Further places to leave free.
     """
 
     def __init__(
@@ -138,7 +141,7 @@ class Labels:
         draw_text(self.surface, text, place.center, ink, TEXT_PX, False, "center")
 
     def _place(self, size_px: tuple[int, int], spot_px: tuple[float, float], reach_px: float) -> pygame.Rect:
-        """Take a free place near a spot; the nearest one that covers least when all are taken."""
+        """Reserve a free place near a spot; if none is free, the one that covers least."""
         picture = self.surface.get_rect()
         field = pygame.Rect(4, HEADER_PX, picture.width - 8, picture.height - HEADER_PX - FOOTER_PX)
         best, least = pygame.Rect((0, 0), size_px), np.inf
@@ -161,7 +164,7 @@ class Labels:
 
 
 def draw_labels(surface: pygame.Surface, canvas: Canvas, scene: Scene, arena: Arena, theme: Theme) -> None:
-    """Write the boats' numbers, what the shield did, and the closest distance."""
+    """Write the boats' numbers, the shield's interventions, and the closest distance."""
     reach_px = max(arena.separation_m / 2 * canvas.scale_px_per_m, MIN_HULL_PX / 2)
     spots = [canvas.to_px(centre) for centre in scene.position_m]
     labels = Labels(surface, spots, reach_px, _marks_to_clear(canvas, scene))
@@ -182,7 +185,7 @@ def draw_labels(surface: pygame.Surface, canvas: Canvas, scene: Scene, arena: Ar
 
 
 def _marks_to_clear(canvas: Canvas, scene: Scene) -> list[pygame.Rect]:
-    """Boxes over the flags and along the arrows of commands the shield changed."""
+    """Return boxes over the flags and along the arrows of changed commands."""
     feet = [canvas.to_px(foot) for foot in scene.flag_position_m]
     boxes = [pygame.Rect(round(x) - 6, round(y) - 28, 28, 32) for x, y in feet]
     if scene.overlay is None:

@@ -20,10 +20,10 @@ from steerclear.shield.exceptions import ConfigError
 MODES = ("human", "rgb_array")
 MIN_WIDTH_PX, MAX_WIDTH_PX = 320, 4096
 BLOCK_PX = 16
-"""Both sides are multiples of this, because video encoders work in such blocks."""
+"""Both sides are multiples of this, the block size of video encoders."""
 
 UNSEEN = ("dummy", "offscreen")
-"""Drivers SDL falls back to where there is no display: windows open, and nobody sees them."""
+"""Drivers that SDL falls back to without a display: windows open, but nobody sees them."""
 
 
 class Picture:
@@ -60,7 +60,7 @@ class Picture:
         return self._canvas.finished()
 
     def draw(self, scene: Scene, show_commands: bool = True) -> pygame.Surface:
-        """Return a surface of ``size_px`` with a moment, with its commands or without."""
+        """Return a surface of ``size_px`` with a moment, with or without its commands."""
         self._canvas.surface.blit(self._field, (0, 0))
         draw_boats(self._canvas, scene, self.arena, self.theme, show_commands)
         surface = self._canvas.finished()
@@ -83,9 +83,9 @@ class Renderer:
         mode: One of ``MODES``.
         width_px: Width of the picture; the height follows from the field.
         theme: "light" or "dark".
-        show_commands: Draw nominal and filtered commands when ``draw`` is given them.
-        speedup: In a window, how many times faster than real time to go at most; None does not wait. It may be
-            changed at any time.
+        show_commands: Draw nominal and filtered commands if ``draw`` gets them.
+        speedup: In a window, how many times faster than real time to go at most; None does not wait. It may be changed
+            at any time.
 
     Raises:
         ConfigError: The mode, the width or the theme cannot be used.
@@ -108,13 +108,13 @@ class Renderer:
         self._looks = (width_px, theme)
         self.describe(game)
         self.overlay: Overlay | None = None
-        """What `draw` shows when it is given no overlay: whoever sends the commands may leave them here."""
+        """Overlay that `draw` shows by default; whoever sends the commands may set it."""
         self._window: Window | None = None
         self._track: deque[np.ndarray] = deque(maxlen=max(2, round(TRAIL_S / self.arena.dt_s)))
         self._last_s = -np.inf
 
     def describe(self, game: GameConfig | Mapping[str, Any] | Arena) -> None:
-        """Take over what the game's config does not tell: shielded boats, separation, policies, reasons.
+        """Set what the game's config lacks: shielded boats, separation, policies, reasons.
 
         Args:
             game: A record's ``meta``, see ``meta_of``, or an ``Arena``; of the same field.
@@ -128,11 +128,11 @@ class Renderer:
         self._picture = Picture(self.arena, *self._looks)
 
     def draw(self, view: Any, overlay: Overlay | None = None) -> np.ndarray | None:
-        """Show a moment; the track behind the boats is made of the moments shown so far.
+        """Show a moment. The tracks behind the boats consist of the moments shown so far.
 
         Args:
             view: A ``GameView``.
-            overlay: Commands of the last step and what the shield made of them; None takes ``self.overlay``.
+            overlay: Nominal and filtered commands of the last step; None takes ``self.overlay``.
 
         Returns:
             (height, width, 3) uint8 in mode "rgb_array", None in mode "human".
@@ -195,14 +195,14 @@ class Window:
         self.closed = False
 
     def show(self, surface: pygame.Surface, frames_per_s: float | None) -> None:
-        """Show a picture, answer the window system, and wait so that frames come no faster than asked."""
+        """Show a picture, handle window events, and wait so that frames do not exceed the given rate."""
         self._screen.blit(surface, (0, 0))
         pygame.display.flip()
         self._pump()
         self._clock.tick(frames_per_s or 0)
 
     def _pump(self) -> None:
-        """Take in what the window system and the keyboard have to say."""
+        """Read events of the window system and the keyboard."""
         for event in pygame.event.get():
             if event.type == pygame.QUIT:
                 self.closed = True

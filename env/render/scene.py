@@ -1,4 +1,4 @@
-"""What a picture shows: the field, which stays the same during a game, and one moment of the game."""
+"""What a picture shows: the field, which does not change during a game, and one moment of the game."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from steerclear.shield.exceptions import TraceError
 from steerclear.shield.platforms.layout import HEADING, SPEED, X, Y
 
 HULL_LENGTH_M = {"heron": 1.3, "surveyor": 1.8, "large_usv": 4.0}
-"""Length a hull is drawn with, m; other platforms get ``DEFAULT_HULL_M``."""
+"""Length of a drawn hull, m; other platforms get ``DEFAULT_HULL_M``."""
 
 DEFAULT_HULL_M = 1.5
 
@@ -39,7 +39,7 @@ class Arena:
     bounds_m: Pair  # Width and height of the field
     flag_home_m: tuple[Pair, Pair]  # Home of each team's flag
     catch_radius_m: float  # Tag and grab radius
-    flag_keepout_m: float  # Radius around a flag at home that its own boats stay out of
+    flag_keepout_m: float  # Radius around a flag at home that its own boats must not enter
     separation_m: float  # Distance at which two boat centres violate the separation
     scrimmage_m: tuple[Pair, Pair]  # Two points of the line between the halves
     team: tuple[int, ...]  # Team of each boat; ``names`` and ``platforms`` likewise
@@ -90,7 +90,7 @@ class Arena:
 
     @classmethod
     def from_config(cls, config: GameConfig, **settings: Any) -> Arena:
-        """Read a game's settings, and those that a game does not know: see ``meta_of``.
+        """Read a game's settings, and further ones that a game does not know: see ``meta_of``.
 
         Raises:
             TraceError: A setting has a value of the wrong kind.
@@ -98,11 +98,11 @@ class Arena:
         return cls.from_meta(meta_of(config, **settings))
 
     def hull_length_m(self, boat: int) -> float:
-        """Return the length the boat's hull is drawn with."""
+        """Return the length of the boat's drawn hull."""
         return HULL_LENGTH_M.get(self.platforms[boat], DEFAULT_HULL_M)
 
     def reason_text(self, code: int) -> str:
-        """Return the text of a reason code, or its number when there is none."""
+        """Return the text of a reason code, or its number if there is none."""
         if code == NOT_COVERED:
             return "no shield"
         if not 0 <= code < len(self.reason_names):
@@ -116,7 +116,7 @@ def _point(values: Any) -> Pair:
 
 
 def _bisector(home: Pair, away: Pair) -> tuple[Pair, Pair]:
-    """Two points of the line that has the same distance to both flag homes."""
+    """Return two points of the line that has the same distance to both flag homes."""
     x, y = (home[0] + away[0]) / 2, (home[1] + away[1]) / 2
     return (x, y), (x + (away[1] - home[1]), y - (away[0] - home[0]))
 
@@ -128,17 +128,17 @@ def _obstacles(entries: Mapping[str, Any]) -> tuple[Obstacle, ...]:
 
 @dataclass(frozen=True)
 class Overlay:
-    """Nominal commands of n boats and what the shield made of them."""
+    """Nominal commands of n boats and the shield's decisions on them."""
 
     wanted: np.ndarray  # (n, 2) nominal speed m/s and absolute heading deg
-    sent: np.ndarray  # (n, 2) likewise, what the boats received
+    sent: np.ndarray  # (n, 2) likewise, the commands that the boats received
     reason: np.ndarray  # (n,) shield reason codes
     intervened: np.ndarray  # (n,) bool
     safety_margin_m: np.ndarray  # (n,) NaN where there is none
 
     @classmethod
     def of_commands(cls, wanted: np.ndarray, sent: np.ndarray) -> Overlay:
-        """Show commands (n, 2) of which only the values are known; those that differ count as changed."""
+        """Build an overlay from commands (n, 2) alone; those that differ count as changed."""
         changed = np.any(np.not_equal(wanted, sent), axis=1)
         return cls(wanted, sent, np.full(len(changed), NOT_COVERED), changed, np.full(len(changed), np.nan))
 
@@ -166,14 +166,23 @@ class Scene:
 
     @classmethod
     def from_view(cls, view: Any, trail_m: np.ndarray, overlay: Overlay | None = None) -> Scene:
-        """Take a live game: a ``GameView``, positions (k, n, 2) up to now, and the commands of the last step."""
+        """Build a scene from a live game.
+
+        Args:
+            view: A ``GameView``.
+            trail_m: (k, n, 2) positions up to now.
+            overlay: Commands of the last step.
+        """
         state = np.asarray(view.state)
         marks = (np.asarray(getattr(view, name)) for name in (*_OF_BOATS, "is_disabled", "flag_position", "captures"))
         return cls(float(view.time_s), state[:, [X, Y]], state[:, HEADING], state[:, SPEED], *marks, trail_m, overlay)
 
     @classmethod
     def from_record(cls, record: Mapping[str, np.ndarray], step: int, dt_s: float) -> Scene:
-        """Take step 0..T of a record, with the command that is given there; the last state shows the last command."""
+        """Build a scene from step 0..T of a record, with the command given there.
+
+        The last state shows the last command.
+        """
         commanded = min(step, len(record["wanted"]) - 1)
         commands = ("wanted", "sent", "reason", "intervened", "safety_margin_m")
         overlay = None if commanded < 0 else Overlay(*(record[name][commanded] for name in commands))
@@ -185,14 +194,17 @@ class Scene:
 
 
 def _gaps_m(scene: Scene) -> np.ndarray:
-    """(n, n) distances above the diagonal, infinite elsewhere."""
+    """Return distances (n, n) above the diagonal, infinite elsewhere."""
     gap_m = np.linalg.norm(scene.position_m[:, None] - scene.position_m[None], axis=-1)
     gap_m[np.tril_indices(len(gap_m))] = np.inf
     return np.asarray(gap_m)
 
 
 def closest_pair(scene: Scene, arena: Arena) -> tuple[int, int, float] | None:
-    """Return the closest two boats, one of them shielded where any is, and their distance, m; None without a pair."""
+    """Return the closest two boats and their distance, m; None without a pair.
+
+    If any boat is shielded, at least one of the two is.
+    """
     if len(scene.position_m) < 2:
         return None
     gap_m, covered = _gaps_m(scene), np.array([name in arena.shielded for name in arena.names])

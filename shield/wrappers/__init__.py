@@ -29,7 +29,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """`MctfVecEnv`, imported only when it is asked for: Stable-Baselines3 is an extra."""
+    """Import `MctfVecEnv` on first use: it needs Stable-Baselines3, an optional dependency."""
     if name != "MctfVecEnv":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     try:

@@ -1,8 +1,8 @@
-"""What players of the game may send, read in one place: every environment and wrapper takes and refuses the same.
+"""Reading of actions: all environments and wrappers accept and refuse the same ones.
 
-An action is a whole number (one of 17 discrete ones, -1 stops), a pair (speed m/s, relative heading deg), or the name
-of a field point. Numbers may come as Python's, numpy's or a tensor's, in an array without axes or of one entry, and as
-floats that are whole.
+An action is a whole number (one of 17 discrete actions; -1 stops), a pair (speed m/s, relative heading deg) or the name
+of a field point. Numbers may be Python's, numpy's or a tensor's, in an array without axes or with one entry, or
+whole-valued floats.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ..jit import Array
 
 HEADINGS_DEG = (180.0, 135.0, 90.0, 45.0, 0.0, -45.0, -90.0, -135.0)
 DISCRETE = np.array([(share, heading) for share in (1.0, 0.5) for heading in HEADINGS_DEG] + [(0.0, 0.0)])
-"""(17, 2) share of top speed and relative heading, deg, of each discrete action; the last one stops."""
+"""(17, 2): share of top speed and relative heading (deg) of each discrete action. The last one stops the boat."""
 STOP = len(DISCRETE) - 1
 
 Command = tuple[float, float]
@@ -29,22 +29,22 @@ Command = tuple[float, float]
 
 
 class Seat(NamedTuple):
-    """What is known of the boat whose action is read."""
+    """What `read_action` knows of the boat that acts."""
 
-    name: str  # of the boat, for messages
+    name: str  # of the boat, for error messages
     top_mps: float  # its top speed, m/s
-    # the command that steers for a field point; None where there are none
+    # command that steers for a field point; None if the game has no field points
     to_point: Callable[[str], Command] | None = None
-    points: Sequence[str] = ()  # names of the field points, where they are known
-    numbered: bool = False  # whole numbers are field points, not discrete actions
-    lowest: int = -1  # lowest number of a discrete action; they count from the end, as Python's indices do
-    bools: bool = False  # True and False are numbers
-    longer: bool = False  # of more than two entries the first two count
-    pairs: bool = True  # pairs are played as well as numbers
+    points: Sequence[str] = ()  # names of the field points, if known
+    numbered: bool = False  # whole numbers select field points, not discrete actions
+    lowest: int = -1  # lowest number of a discrete action; negative ones count from the end, as Python indices do
+    bools: bool = False  # True and False count as numbers
+    longer: bool = False  # of a longer action the first two entries count
+    pairs: bool = True  # pairs are accepted as well as numbers
 
 
 def check_agents(actions: Any, agent_ids: Sequence[str]) -> None:
-    """Check that actions are a dict of known boats; missing ones stop."""
+    """Check that actions are a dict whose keys are boats of the game. Boats without an action stop."""
     if not isinstance(actions, Mapping):
         raise GameError(f"actions are a {type(actions).__name__}; give a dict of agent id -> action")
     for agent_id in actions:
@@ -53,10 +53,10 @@ def check_agents(actions: Any, agent_ids: Sequence[str]) -> None:
 
 
 def read_action(seat: Seat, action: Any) -> Command:
-    """The command that an action is.
+    """Return the command of an action.
 
     Raises:
-        GameError: it is none; the message names the boat and what to give.
+        GameError: the action is invalid; the message names the boat and what to give.
     """
     plain = plain_action(seat, action)
     if isinstance(plain, str):
@@ -68,10 +68,12 @@ def read_action(seat: Seat, action: Any) -> Command:
 
 
 def plain_action(seat: Seat, action: Any) -> int | str | Command:
-    """An action as its plainest form: a number 0..16, a field point's name (not looked up), or a pair of floats."""
-    if type(action) is int and seat.lowest <= action <= STOP and not seat.numbered:  # what most policies send,
+    """Return an action in its plainest form: a number 0..16, a field point's name (not looked up) or two floats."""
+    if (
+        type(action) is int and seat.lowest <= action <= STOP and not seat.numbered
+    ):  # fast path: what most policies send
         return action % len(DISCRETE)
-    if _is_plain_pair(action):  # and the scripted ones
+    if _is_plain_pair(action):  # fast path: what the scripted policies send
         return action
     if isinstance(action, np.ndarray) and action.ndim == 0 and action.dtype.kind in "OU":
         action = action.item()
@@ -97,7 +99,7 @@ def _is_plain_pair(action: Any) -> TypeGuard[Command]:
 
 
 def _values(seat: Seat, action: Any) -> Array:
-    """The numbers of an action."""
+    """Return the numbers of an action."""
     if not seat.bools and holds_bools(action):
         raise _unusable(seat, action)
     try:
@@ -105,7 +107,7 @@ def _values(seat: Seat, action: Any) -> Array:
     except NoNumbersError:
         pass
     try:
-        return np.array(float(operator.index(action)))  # anything that indexes a list
+        return np.array(float(operator.index(action)))  # anything that can index a list
     except Exception:  # foreign code may raise anything
         raise _unusable(seat, action) from None
 
@@ -128,7 +130,7 @@ def _point(seat: Seat, name: str) -> Command:
     try:
         if not seat.points or name in seat.points:
             return seat.to_point(name)
-    except KeyError:  # a game that does not tell its points knows them
+    except KeyError:  # the game does not list its points, but knows them
         pass
     near = difflib.get_close_matches(name, seat.points, n=3)
     hint = f"did you mean {', '.join(near)}?" if near else f"there are {', '.join(seat.points) or 'others'}"
@@ -153,7 +155,7 @@ def _whole(value: float) -> str:
 
 
 def short(what: Any, length: int = 80) -> str:
-    """What was given, in one line that is not too long."""
+    """Return the value's repr in one line of at most ``length`` characters."""
     what = what.item() if isinstance(what, np.generic) else what
     try:
         text = " ".join(repr(what).split())
@@ -163,9 +165,13 @@ def short(what: Any, length: int = 80) -> str:
 
 
 def read_flat(actions: Any, top_mps: Array, seat_of: Callable[[int], Seat], pairs: bool) -> Array:
-    """Commands (n, 2) of the actions of n boats of top speeds (n,), m/s: an array, or n actions of any kind.
+    """Return commands (n, 2) for the actions of n boats: speed m/s, relative heading deg.
 
-    Arrays hold pairs, or discrete numbers; ``seat_of`` each boat is for messages.
+    Args:
+        actions: an array of pairs (n, 2) or of discrete actions (n,), or n actions of any kind.
+        top_mps: (n,) top speeds, m/s.
+        seat_of: describes boat i, for error messages.
+        pairs: arrays hold pairs, not discrete actions.
     """
     n = len(top_mps)
     try:

@@ -1,7 +1,4 @@
-"""A shield at work in one game: whether it fits, and serves nobody else, since it remembers the boats it decides for.
-
-What a wrapper relies on is checked here, or taken from the game.
-"""
+"""Checks that a shield fits its game and serves one team only. A shield remembers the boats it decides for."""
 
 from __future__ import annotations
 
@@ -27,14 +24,14 @@ from .readers import GameReader, reader_of
 SIDES = ("blue", "red")
 
 _INNER = ("env", "aec_env", "par_env")
-"""Where PettingZoo's wrappers and conversions keep what they wrap."""
+"""Attributes in which PettingZoo's wrappers and conversions hold the environment they wrap."""
 
 
 def settings_of(game: Any) -> dict[str, float]:
-    """Settings of a shield for a game: its step and distances, see `Shield.for_game`.
+    """Return the settings of a shield for a game: its step and distances, see `Shield.for_game`.
 
     Raises:
-        ConfigError: no game that can be read, or one with settings that no shield can be built for.
+        ConfigError: the game cannot be read, or has settings that no shield can be built for.
     """
     if hasattr(game, "core") or not hasattr(game, "n_games"):
         return reader_of(game).facts().settings()
@@ -42,7 +39,7 @@ def settings_of(game: Any) -> dict[str, float]:
 
 
 def team_number(team: str | int) -> int:
-    """0 for "blue", 1 for "red"."""
+    """Return 0 for "blue" and 1 for "red"."""
     if isinstance(team, str) and team in SIDES:
         return SIDES.index(team)
     if isinstance(team, Integral) and not isinstance(team, bool) and team in (0, 1):
@@ -51,7 +48,7 @@ def team_number(team: str | int) -> int:
 
 
 def one_game_shield(shield: Any) -> Any:
-    """The shield itself, if it is one for a single game, and not for a batch of them."""
+    """Return the shield if it decides for a single game; refuse classes, other objects and shields of a batch."""
     if isinstance(shield, type) or not callable(getattr(shield, "decide", None)) or hasattr(shield, "filter_for"):
         found = shield.__name__ if isinstance(shield, type) else type(shield).__name__
         raise ConfigError(f"{found} is no shield of one game; give steerclear.shield.Shield.for_game(game)")
@@ -59,7 +56,7 @@ def one_game_shield(shield: Any) -> Any:
 
 
 def words_of(shield: Any) -> str:
-    """What a shield keeps, for whoever prints what it is wrapped round; its kind where it has no settings."""
+    """Describe a shield for a repr: its main settings, or its type where it has none."""
     config = getattr(shield, "config", None)
     if not isinstance(config, ShieldConfig):
         return type(shield).__name__
@@ -67,26 +64,26 @@ def words_of(shield: Any) -> str:
 
 
 class Serving:
-    """Whether a shield serves whoever holds this, and not another team or game; deciders of users' own always do."""
+    """Checks that a shield serves its holder only. Deciders of the user's own are never refused."""
 
     def __init__(self, shield: Any) -> None:
         self.shield = shield
 
     def begin(self) -> None:
-        """Let the shield forget all and serve the holder."""
+        """Reset the shield and let it serve the holder."""
         self.shield.reset()
         if isinstance(self.shield, Shield):
             self.shield.serves = self
 
     def check(self) -> None:
-        """Refuse a shield that has begun to serve others since; one that serves nobody serves the holder now.
+        """Refuse a shield that serves someone else. A shield that serves nobody now serves the holder.
 
         Raises:
-            ConfigError: it has.
+            ConfigError: the shield has begun to serve another team or game.
         """
         if not isinstance(self.shield, Shield):
             return
-        if self.shield.serves is None:  # somebody reset it
+        if self.shield.serves is None:  # someone reset it
             self.shield.serves = self
         if self.shield.serves is not self:
             raise ConfigError(
@@ -99,15 +96,15 @@ class ShieldedGame:
     """A shield at work for one team of one game.
 
     Args:
-        shield: the shield, or a decider of the user's own, which is taken as it is.
+        shield: the shield, or a decider of the user's own, which is not adapted to the game.
         reader: reads the game.
         team: 0 or 1.
-        shield_autopilot: also decide for boats the game drives (our env only).
+        shield_autopilot: also decide for game-controlled boats (our env only).
         keep_out: keep clear of the own flag's circle, in which the game stops boats.
-        held: decide once for all the moves that the game makes of a policy's answer, else before each.
+        held: decide once for all substeps of one action; otherwise decide before each substep.
 
     Attributes:
-        shield: the shield, or one like it with the game's distances where nobody chose them.
+        shield: the shield, or a copy of it with the game's distances where the user chose none.
 
     Raises:
         ConfigError: the shield is for another step, or the game has settings that no shield can be built for.
@@ -121,16 +118,16 @@ class ShieldedGame:
         self._fit()
 
     def begin(self) -> None:
-        """Begin a game with a shield that remembers nothing.
+        """Begin a game with a reset shield.
 
         Raises:
-            ConfigError: the game was set since to what the shield is not for.
+            ConfigError: the game's settings have changed and the shield does not fit them.
         """
         self._fit()
         self._serving.begin()
 
     def _fit(self) -> None:
-        """Make the shield fit the game as it is, and note what that is; later changes of its arrays change no fact."""
+        """Fit the shield to the game's settings and copy them, so that later changes can be noticed."""
         facts = self.reader.facts()
         config = getattr(self.shield, "config", None)
         if isinstance(config, ShieldConfig):
@@ -142,10 +139,10 @@ class ShieldedGame:
         self._serving = Serving(self.shield)
 
     def check(self) -> None:
-        """Refuse a game that was set to something else in its middle, and a shield that serves others.
+        """Refuse a game whose settings have changed since the reset, and a shield that serves someone else.
 
         Raises:
-            ConfigError: it was, or has settings by now that no shield can be built for, or the shield does.
+            ConfigError: the settings have changed, no shield can be built for them, or the shield serves someone else.
         """
         now = self.reader.facts()
         for name in GameFacts._fields:
@@ -156,7 +153,7 @@ class ShieldedGame:
         self._serving.check()
 
     def seen(self) -> tuple[Fleet, Surroundings]:
-        """The boats now, and what is around them."""
+        """Return the boats as they are, and their surroundings."""
         fleet = self.reader.fleet(self.team, self.shield_autopilot)
         return fleet, self.reader.surroundings(self.team, self.keep_out)
 
@@ -168,7 +165,7 @@ class ShieldedGame:
 
 
 def layers_of(env: Any) -> Iterator[Any]:
-    """The environment and all it wraps, outermost first."""
+    """Yield the environment and everything it wraps, outermost first."""
     while env is not None:
         yield env
         inner = vars(env) if hasattr(env, "__dict__") else {}

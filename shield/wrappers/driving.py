@@ -1,4 +1,4 @@
-"""What a game drives its boats by, tagged, out of bounds or disabled, for `Fleet.driven`."""
+"""What the game makes tagged, out-of-bounds and disabled boats do, for `Fleet.driven`."""
 
 from __future__ import annotations
 
@@ -12,27 +12,29 @@ from ..jit import Array, BoolArray
 from ..platforms import layout as L
 
 FAR_M = 1e7
-"""Distance of the place that a boat out of bounds is steered at: straight off the edge, to 1e-3 deg in any field."""
+"""Distance of the place that an out-of-bounds boat is steered at. So far off it is straight off the edge, to 1e-3 deg
+in any field.
+"""
 SPEED, PLACE, UNTIL = 0, slice(1, 3), 3
-"""Columns of `Fleet.driven`: speed m/s, place m, time s."""
+"""Columns of `Fleet.driven`: speed (m/s), place (m), time (s)."""
 
 LEAST_MPS = 1e-6
-"""A boat is taken to move at least so fast, so that a time to anywhere is finite."""
+"""Least speed a boat is assumed to make, so that every travel time is finite."""
 
 
 class Drives(NamedTuple):
-    """How a game drives the n boats of two teams, blue first."""
+    """How a game controls the n boats of two teams, blue first."""
 
-    marks: Sequence[Array]  # for each team, places (k, 2), m: its tagged boats are steered at the nearest
-    ends: Sequence[Array]  # for each team, places (k, 2), m, near which tagged boats are free again
-    near_m: float  # how near that is; NaN: nobody knows the way of tagged boats, such as among obstacles
-    size: Array  # of the field, m; boats out of bounds are steered straight off the nearest edge
-    tagged_mps: Array  # speed, m/s, commanded to tagged boats, (n,) or one for all,
-    oob_mps: Array  # and to boats out of bounds
+    marks: Sequence[Array]  # per team, places (k, 2), m; tagged boats are steered at the nearest
+    ends: Sequence[Array]  # per team, places (k, 2), m, near which tagged boats are free again
+    near_m: float  # how near, m; NaN: the way of tagged boats is unknown, such as among obstacles
+    size: Array  # (2,) of the field, m; out-of-bounds boats are steered straight off the nearest edge
+    tagged_mps: Array  # commanded speed of tagged boats, m/s, (n,) or one for all
+    oob_mps: Array  # commanded speed of out-of-bounds boats, m/s
 
 
 class Driven(NamedTuple):
-    """Which boats (..., n) the game drives now, and for how long yet, s, those are stopped that are disabled."""
+    """Which boats (..., n) the game controls at this moment, and how long disabled ones stay stopped, s."""
 
     tagged: BoolArray
     oob: BoolArray
@@ -41,7 +43,7 @@ class Driven(NamedTuple):
 
 
 def driven_rows(drives: Drives, driven: Driven, state: Array, team: Any) -> Array | None:
-    """Rows of `Fleet.driven`, (..., n, 4), of boats at a state (..., n, N_STATE); None where none is driven."""
+    """Return rows (..., n, 4) of `Fleet.driven` for boats at a state (..., n, N_STATE); None if none is controlled."""
     tagged, oob, disabled, disabled_for_s = driven
     if not (tagged | oob | disabled).any():
         return None
@@ -63,12 +65,12 @@ def driven_rows(drives: Drives, driven: Driven, state: Array, team: Any) -> Arra
 
 
 def nearest(position: Array, places: Array) -> Array:
-    """Of the places (k, 2) the one nearest to each boat (..., 2)."""
+    """Return, of the places (k, 2), the one nearest to each boat (..., 2)."""
     return np.asarray(places[_distances(position, places).argmin(axis=-1)])
 
 
 def inwards(position: Array, size: Array) -> tuple[Array, Array]:
-    """Far places straight off the edge nearest to boats (..., 2) out of bounds, m, and how far they are beyond, m."""
+    """Return far places straight off the nearest edge, and how far the boats (..., 2) are out of bounds; metres."""
     x, y = position[..., 0], position[..., 1]
     beyond_m = np.stack([-y, x - size[0], y - size[1], -x], axis=-1)
     edge = beyond_m.argmax(axis=-1)
@@ -79,7 +81,7 @@ def inwards(position: Array, size: Array) -> tuple[Array, Array]:
 
 
 def driven_boats(core: Any) -> Array | None:
-    """Rows of `Fleet.driven` for each of the B games of a `BatchedMctf`, (B, n, 4); None where they drive no boat."""
+    """Return rows of `Fleet.driven` for the B games of a `BatchedMctf`, (B, n, 4); None if they control no boat."""
     if not (core.is_tagged | core.oob | core.is_disabled).any():
         return None
     config, rules, corners = core.config, core.rules, core.config.untag_at == "own_corners"
@@ -105,5 +107,5 @@ def _distances(position: Array, places: Array) -> Array:
 
 
 def _of(values: Array, which: Any) -> Array:
-    """Of the last axis the entry that is asked for."""
+    """Select one entry of the last axis."""
     return np.take_along_axis(values, np.asarray(which)[..., np.newaxis], axis=-1)[..., 0]

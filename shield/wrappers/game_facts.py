@@ -1,4 +1,4 @@
-"""What a shield relies on of a game: its step, and how near boats may come before it counts a collision."""
+"""The settings of a game that a shield relies on: its step, and the distances at which it counts collisions."""
 
 from __future__ import annotations
 
@@ -22,21 +22,24 @@ _WHY = {"separation_m": "counts collisions", "obstacle_clearance_m": "has boats 
 
 
 class GameFacts(NamedTuple):
-    """Attributes of a game."""
+    """Settings of a game."""
 
-    dt_s: float  # time the boats are moved by for one command, s
+    dt_s: float  # length of a substep, in which the boats move under one command, s
     radius_m: Array  # (n,) radius of each boat, m; two boats collide when no farther apart than the sum
-    team: IntArray  # (n,) team of each boat
-    obstacles: bool  # whether there are any, which boats hit by their radius
-    decision_s: float = 0.0  # time that the boats are moved by for one answer of a policy, s; 0: the same
+    team: IntArray  # (n,) team number of each boat
+    obstacles: bool  # the game has obstacles, which a boat hits by its radius
+    decision_s: float = 0.0  # time that the boats move for one action of a policy, s; 0: the same as dt_s
 
     @property
     def moves(self) -> int:
-        """Moves of the boats for one answer of a policy."""
+        """Number of substeps for one action of a policy."""
         return max(1, round(self.decision_s / self.dt_s))
 
     def distances(self, team: int | None = None) -> dict[str, float]:
-        """Largest distances, m, at which a boat of the team (None: any boat) hits another or an obstacle; 0: none."""
+        """Return the distances, m, at which boats collide with each other and with obstacles; 0: never.
+
+        Each is the largest over the boats of the team (None: of both teams).
+        """
         ours = np.ones(len(self.team), bool) if team is None else self.team == team
         pairs = ours[:, None] & ~np.eye(len(ours), dtype=bool)
         collision_m = float((self.radius_m[:, None] + self.radius_m)[pairs].max(initial=0.0))
@@ -44,12 +47,12 @@ class GameFacts(NamedTuple):
         return {"separation_m": collision_m, "obstacle_clearance_m": clearance_m}
 
     def settings(self) -> dict[str, float]:
-        """Settings of a shield for this game, by name."""
+        """Return the settings of a shield for this game, by name."""
         return {"dt_s": self.dt_s, **{name: metres for name, metres in self.distances().items() if metres > 0.0}}
 
 
 def facts_of_games(core: Any) -> GameFacts:
-    """Facts of a `BatchedMctf`."""
+    """Return the settings of a `BatchedMctf`."""
     config = core.config
     return GameFacts(
         float(config.dt_s), core.agent_radius_m, core.team, config.n_obstacles > 0, float(config.decision_s)
@@ -57,18 +60,19 @@ def facts_of_games(core: Any) -> GameFacts:
 
 
 def fitting(config: ShieldConfig, facts: GameFacts, team: int, held: bool = False) -> ShieldConfig:
-    """The settings for a game, whose distances replace those that nobody chose and that are smaller; the log says so.
+    """Return a shield's settings fitted to a game.
 
-    A smaller one that was chosen stays: it may be meant, as where hits are counted at two radii. The log tells that.
+    The game's distances replace smaller ones that the user did not choose; the log says so. A smaller distance that the
+    user chose stays, since it may be meant; the log warns of it.
 
     Args:
         config: a shield's settings.
         facts: the game.
         team: the team to shield.
-        held: the shield decides once for all moves that the game makes of a policy's answer, else before each.
+        held: the shield decides once for all substeps of an action; otherwise before each substep.
 
     Raises:
-        ConfigError: the settings are for another step, or another number of moves.
+        ConfigError: the settings are for another step or another number of substeps.
     """
     config = _for_held_commands(config, facts) if held and facts.moves > 1 else _for_moves(config, facts)
     larger: dict[str, Any] = {}
@@ -84,7 +88,7 @@ def fitting(config: ShieldConfig, facts: GameFacts, team: int, held: bool = Fals
 
 
 def _for_moves(config: ShieldConfig, facts: GameFacts) -> ShieldConfig:
-    """The settings, if they are for a decision before each move: else boats would be predicted elsewhere."""
+    """Return the settings if they are for a decision before each substep; otherwise predictions would be wrong."""
     remedy = f"build it by Shield.for_game(game), or with dt_s={facts.dt_s:g}"
     if config.moves > 1:
         raise ConfigError(
@@ -100,7 +104,7 @@ def _for_moves(config: ShieldConfig, facts: GameFacts) -> ShieldConfig:
 
 
 def _for_held_commands(config: ShieldConfig, facts: GameFacts) -> ShieldConfig:
-    """The settings for all moves at once, from those for the moves themselves, or already made so."""
+    """Return settings for one decision per action, from those for single substeps or already of this form."""
     given = config.moves > 1
     if not math.isclose(config.model_s, facts.dt_s, rel_tol=1e-9) or (given and config.moves != facts.moves):
         steps = f", {config.moves} of them a command" if given else ""
@@ -113,7 +117,7 @@ def _for_held_commands(config: ShieldConfig, facts: GameFacts) -> ShieldConfig:
 
 
 def warn_of_distances(config: ShieldConfig, facts: GameFacts, team: int | None) -> None:
-    """Log, once, that a shield keeps less than the distances of its game."""
+    """Log, once, that a shield's distances are smaller than those of its game."""
     for name, metres in facts.distances(team).items():
         if getattr(config, name) < metres - 1e-9:
             _warn_once(
@@ -129,7 +133,7 @@ def _warn_once(words: str) -> None:
 
 
 def platforms_of(core: Any) -> tuple[str | Platform, ...]:
-    """Platforms of the boats of a `BatchedMctf`."""
+    """Return the platforms of the boats of a `BatchedMctf`."""
     kinds = core.config.platforms
     return tuple(kinds) if isinstance(kinds, (tuple, list)) else (kinds,) * core.n_boats
 
@@ -137,7 +141,7 @@ def platforms_of(core: Any) -> tuple[str | Platform, ...]:
 def check_same_games(
     core: Any, games: int, platforms: Sequence[str | Platform], team: Sequence[int], dt_s: float
 ) -> None:
-    """Refuse games that a shield was not built for: it would predict other boats than are there, or other steps."""
+    """Refuse games with other boats, teams, steps or numbers of games than the shield was built for."""
     ours, theirs = (tuple(map(get_platform, kinds)) for kinds in (platforms, platforms_of(core)))
     for what, mine, others in (
         ("boats", ours, theirs),

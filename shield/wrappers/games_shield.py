@@ -1,4 +1,4 @@
-"""`games_shield`: the shield for one team in a batch of our own games, with their static constraints."""
+"""`games_shield`: the shield for one team in a batch of our own games, with their static obstacles."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ def games_shield(
 
     Args:
         core: the games.
-        config: settings; None takes the defaults, with the games' step and distances. Distances that nobody chose in
-            it are the games', where those are larger.
-        team: "blue" or "red", the team that will be shielded, see `BatchedShield.filter_for`.
+        config: settings; None: the defaults, with the games' step and distances. The games' distances replace smaller
+            ones that the user did not choose.
+        team: "blue" or "red", the team to shield, see `BatchedShield.filter_for`.
         keep_out: keep clear of the own flag's circle; boats that enter it while the flag is home are stopped.
         threads: see `BatchedShield`.
 
     Raises:
-        ConfigError: unknown team, another step than the games', or a setting that a batch cannot honour.
+        ConfigError: unknown team, another step than the games', or a setting that a batch does not support.
     """
     if config is not None and not isinstance(config, ShieldConfig):
         raise ConfigError(
@@ -45,23 +45,23 @@ def games_shield(
 
 
 def check_games(shield: BatchedShield, core: Any, team: int | None = None) -> None:
-    """Check that games are those a shield was built for; the log says, once, if it keeps boats less far apart."""
+    """Check that the shield was built for these games; warn once if its distances are smaller than theirs."""
     check_same_games(core, len(shield.reason), shield.platforms, shield.team, shield.config.dt_s)
     warn_of_distances(shield.config, facts_of_games(core), team)
 
 
 class GamesFilter:
-    """The command filter of a shield for games, see `BatchedShield.filter_for`; copies of it decide by copies of it."""
+    """The command filter of a shield for games, see `BatchedShield.filter_for`. Copying it copies the shield."""
 
     def __init__(self, shield: BatchedShield, team: int, shield_autopilot: bool) -> None:
         self.shield, self.team, self.shield_autopilot = shield, team, shield_autopilot
         self._checked: Any = None
 
     def __call__(self, core: Any, commands: Array) -> Array:
-        """Safe commands (B, n, 2) for games that the shield was built for.
+        """Return filtered commands (B, n, 2) for games that the shield was built for.
 
         Raises:
-            ConfigError: they are others, or it has begun to serve the other team.
+            ConfigError: the games are others, or the shield has begun to serve the other team.
         """
         if self._checked is not core:
             check_games(self.shield, core, self.team)
@@ -72,12 +72,12 @@ class GamesFilter:
         return self.shield.decide(core.state, commands, *self._about(core))
 
     def _about(self, core: Any) -> tuple[BoolArray, BoolArray, Array | None]:
-        """Boats to decide for, boats on the other side, and what drives those that the games drive."""
+        """Return the boats to decide for, the boats on the other side, and rows of `Fleet.driven`."""
         ours = (core.team == self.team) & ~core.is_disabled
         ours = ours if self.shield_autopilot else ours & ~core.driven
         return ours, ~core.on_side, driven_boats(core)
 
     def safe_actions(self, core: Any, actions: Array) -> BoolArray:
-        """Which candidates (B, n, k, 2) would pass in this step, (B, n, k); see `masks`."""
+        """Return which candidates (B, n, k, 2) would pass the shield in this step, (B, n, k); see `masks`."""
         ours, visiting, driven = self._about(core)
         return self.shield.safe_actions(core.state, actions, ours, visiting, driven)

@@ -1,4 +1,4 @@
-"""Reading our own game."""
+"""Reading of our own game."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from .game_facts import GameFacts, facts_of_games, platforms_of
 from .readers import game_reader
 
 KEEP_OUT_MARGIN_M = 0.1
-"""Distance kept beyond a flag's keep-out circle, m: the game throws boats back that touch it."""
+"""Distance kept beyond a flag's keep-out circle, because the game throws back boats that touch it."""
 
 
 @game_reader(lambda env: hasattr(env, "core") and hasattr(env, "command_filter"))
 class MctfReader:
-    """Reads an `MctfEnv`: exact state with the autopilots' memory, commands inside its step."""
+    """Reader of an `MctfEnv`: exact state with the autopilots' memory; commands are filtered inside its step."""
 
     takes_pairs_only = False
 
@@ -33,12 +33,12 @@ class MctfReader:
         self._platforms = platforms_of(env.core)
 
     def facts(self) -> GameFacts:
-        """Step and sizes."""
+        """Return step and sizes."""
         return facts_of_games(self.env.core)
 
     @contextmanager
     def filtering(self, safe: Callable[[Array], Array]) -> Iterator[None]:
-        """While inside, commands (n, 2) pass ``safe`` after the last decider; afterwards the game is as it was."""
+        """While inside, commands (n, 2) pass ``safe`` after every other decider; the env is restored after."""
 
         def command_filter(core: Any, commands: Array) -> Array:
             if len(commands) != 1:
@@ -49,24 +49,29 @@ class MctfReader:
             yield
 
     def check_answers(self, agent_ids: Sequence[str]) -> None:
-        """The game plays one command a step, of any kind."""
+        """Accept all answers: the game plays actions of any kind."""
 
     def moment(self) -> float:
-        """Time of the game, s."""
+        """Return the game's time, s."""
         return float(self.env.core.time_s[0])
 
     def fleet(self, team: int, shield_autopilot: bool) -> Fleet:
-        """All boats now; boats the game drives are controlled only with ``shield_autopilot``, disabled ones never."""
+        """Return all boats.
+
+        The shield controls game-controlled boats only with ``shield_autopilot``, and disabled ones never.
+        """
         core = self.env.core
         controlled = (core.team == team) & ~core.is_disabled[0]
         if not shield_autopilot:
             driven = core.is_tagged[0] | core.oob[0]
-            if core.config.n_obstacles > 0:  # who hits obstacles is in it only; between steps it is of the last
+            if (
+                core.config.n_obstacles > 0
+            ):  # between steps, core.driven is that of the last step; only it holds boats that hit obstacles
                 driven = driven | core.driven[0]
             controlled = controlled & ~driven
         rows = driven_boats(core)
         return Fleet(
-            core.state[0].copy(),  # decisions are read after the step has moved the boats
+            core.state[0].copy(),  # copied, because decisions are read after the step has moved the boats
             core.team,
             self._platforms,
             controlled,
@@ -76,23 +81,24 @@ class MctfReader:
         )
 
     def commands(self, actions: Mapping[str, Any]) -> Array:
-        """Commands of actions of any kind the env understands."""
+        """Return the commands of actions of any kind that the env understands."""
         return np.asarray(self.env.decode(actions))
 
     def playable(self, actions: Mapping[str, Any]) -> dict[str, Any]:
-        """The actions: the env takes all that there are."""
+        """Return the actions unchanged: the env accepts all kinds."""
         return dict(actions)
 
     def surroundings(self, team: int, keep_out: bool) -> Surroundings:
-        """Field edge, obstacles and the own flag's circle."""
+        """Return field edge, obstacles and the own flag's circle."""
         return surroundings_of(self.env.core, team, keep_out)
 
 
 def surroundings_of(core: Any, team: int, keep_out: bool = True) -> Surroundings:
-    """Static constraints of a `BatchedMctf`: field edge, obstacles and, with ``keep_out``, the own flag's circle.
+    """Return the static obstacles of a `BatchedMctf`, its field edge included.
 
-    It counts while the flag is away as well: the game throws out who is inside when the flag comes home, at any time.
-    A game with ``flag_keepout_m`` 0 throws nobody out, and has no circle.
+    With ``keep_out`` the own flag's circle is one. It counts while the flag is away too: the flag may come home at any
+    time, and the game then throws out boats inside. A game with ``flag_keepout_m`` 0 throws nobody out and has no
+    circle.
     """
     config, obstacles = core.config, core.config.obstacles or {}
     circles = tuple((float(x), float(y), float(r)) for r, (x, y) in obstacles.get("circle") or ())
@@ -104,7 +110,7 @@ def surroundings_of(core: Any, team: int, keep_out: bool = True) -> Surroundings
 def surroundings(
     size: Any, circles: tuple[Any, ...], polygons: tuple[Any, ...], flag: Any, keepout_m: float, radius_m: Any
 ) -> Surroundings:
-    """Field edge of a size (2,), m, obstacles, and round the flag the circle that boats are kept out of, 0: none."""
+    """Return field edge of size (2,), m, obstacles, and the keep-out circle round the flag (``keepout_m`` 0: none)."""
     circle: tuple[Any, ...] = ()
     if keepout_m > 0.0:
         reach_m = float(keepout_m) + float(np.max(radius_m)) + KEEP_OUT_MARGIN_M

@@ -22,34 +22,34 @@ _OWN = ("env", "masks", "decisions", "_game")
 
 
 class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[misc] # pettingzoo has no types
-    """Shields one team's boats in every step and leaves the decisions in ``infos[agent]["shield"]``.
+    """Shields one team's boats in every step and stores the decisions in ``infos[agent]["shield"]``.
 
-    In our own env the shield sits after the last decider, inside the step, so that it also covers boats the game
-    drives (tagged, out of bounds). In a Pyquaticus env it sits where that has read the actions and not yet moved the
-    boats; boats the env drives itself are out of its reach. Wrap twice to shield both teams, each with a shield of its
-    own; other PettingZoo wrappers may stand in between.
+    In our own env the shield acts inside the step, after every other decider. It therefore also covers game-controlled
+    boats (tagged, out of bounds). In a Pyquaticus env the shield acts after the env has read the actions and before it
+    moves the boats. It cannot reach boats that this env controls itself. To shield both teams, wrap twice with two
+    shields; other PettingZoo wrappers may stand in between.
 
-    It changes nothing outside: what is wrapped, stepped itself, plays as if there were no wrapper, and copies and
-    pickles of the wrapper are games of their own, with a shield of their own.
+    The wrapped env is not changed: stepped itself, it plays as if there were no wrapper. Copies and pickles of the
+    wrapper hold a copy of the game and of the shield.
 
     Args:
         env: an `MctfEnv`, a ``PyQuaticusEnv``, or a PettingZoo wrapper around one.
         shield: the shield; it must not serve another game at the same time. ``Shield.for_game(env)`` fits.
         team: "blue" or "red".
-        shield_autopilot: also decide for boats the game drives (our env only).
+        shield_autopilot: also decide for game-controlled boats (our env only).
         keep_out: keep clear of the own flag's circle, in which the game stops boats.
-        reader: what reads the game, such as sensors that err; None: the env's own state, exact.
-        masks: also leave ``infos[agent]["action_mask"]``: (17,) int8, 1 for each discrete action that the shield would
-            let pass in the next step, beside teammates that go straight on; all 1 where none does.
+        reader: reads the game, for example through sensors with errors; None: the env's own exact state.
+        masks: also store ``infos[agent]["action_mask"]``: (17,) int8, 1 for each discrete action that the shield would
+            pass in the next step, assuming that teammates go straight on; all 1 if none would pass.
 
     Attributes:
-        shield: the shield at work: the one given, or, if the game's boats collide farther apart than it keeps them and
-            nobody chose how far that is, one like it with the game's distance.
+        shield: the shield at work: the given one, or a copy with the game's distances where those are larger and the
+            user chose none.
         decisions: the last decisions, or None.
 
     Raises:
-        ConfigError: the env cannot be read or has settings that no shield can be built for, the shield is none or one
-            for another step or serves the other team, the team is unknown, or has a shield in this env already.
+        ConfigError: the env cannot be read or has settings that no shield can be built for; the shield is none, is for
+            another step or serves the other team; the team is unknown or has a shield in this env already.
     """
 
     def __init__(
@@ -77,22 +77,22 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
 
     @property
     def team(self) -> int:
-        """The team it decides for, 0 or 1."""
+        """Number of the shielded team, 0 or 1."""
         return self._game.team
 
     @property
     def reader(self) -> GameReader:
-        """What reads the game."""
+        """Reader of the game."""
         return self._game.reader
 
     def __repr__(self) -> str:
         return f"<ShieldedParallelEnv of {SIDES[self.team]} in {self.env!r}: {words_of(self.shield)}>"
 
     def reset(self, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, Any]:
-        """Start a game with a shield that remembers nothing.
+        """Start a game with a reset shield.
 
         Raises:
-            ConfigError: the env was set since to what the shield is not for.
+            ConfigError: the env's settings have changed and the shield does not fit them.
         """
         self._game.begin()
         self.decisions = None
@@ -101,10 +101,10 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         return observations, infos
 
     def step(self, actions: dict[str, Any]) -> Any:
-        """One step; commands of the shielded team that are not safe are changed before the boats move.
+        """Play one step. The shield changes unsafe commands of its team before the boats move.
 
         Raises:
-            ConfigError: the env was set since its reset to what the shield is not for, or it has begun to serve others.
+            ConfigError: the env's settings have changed since its reset, or the shield has begun to serve someone else.
         """
         self._game.check()
         with self.reader.filtering(self._safe):
@@ -117,27 +117,27 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         return outcome
 
     def __getattr__(self, name: str) -> Any:
-        """What the game has, with an underscore too: Pyquaticus' own policies are built with the env and read such.
+        """Look an attribute up in the game, private ones too: Pyquaticus' own policies read those of the env.
 
-        Special names and those of this wrapper's own are never looked up there: copying and pickling ask for them
-        before they are set.
+        Special names and the wrapper's own are never looked up there: copying and pickling ask for them before they are
+        set.
         """
         if name.startswith("__") or name in _OWN:
             raise AttributeError(f"{type(self).__name__!r} has no attribute {name!r}")
         return getattr(self.env if not name.startswith("_") else self.env.unwrapped, name)
 
     def _safe(self, commands: Array) -> Array:
-        """The commands (n, 2) to obey, for those wanted."""
+        """Return the filtered commands (n, 2) for nominal ones."""
         self.decisions = self._game.decide(commands)
         return self.decisions.filtered.values
 
     def _covered(self, team: Any, infos: Any) -> list[tuple[int, str]]:
-        """Numbers and ids of the shielded team's boats that have infos."""
+        """Return numbers and ids of the shielded team's boats that have infos."""
         agents = enumerate(self.reader.agent_ids)
         return [(i, agent) for i, agent in agents if team[i] == self.team and agent in infos]
 
     def _mask(self, infos: dict[str, dict[str, Any]]) -> None:
-        """Leave in each covered boat's info which of the discrete actions would pass."""
+        """Store in each shielded boat's info which discrete actions the shield would pass."""
         if not self.masks:
             return
         fleet, around = self._game.seen()
@@ -150,7 +150,7 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
 
 
 def _check_parallel(env: Any) -> None:
-    """Refuse an environment whose boats act in turn (AEC), and a class."""
+    """Refuse a class, and an environment whose boats act in turn (AEC)."""
     if isinstance(env, type):
         raise ConfigError(f"{env.__name__} is a class; give an environment: {env.__name__}(...)")
     if callable(getattr(type(env), "last", None)) and callable(getattr(type(env), "agent_iter", None)):
@@ -161,7 +161,7 @@ def _check_parallel(env: Any) -> None:
 
 
 def _check_not_shielded(env: Any, team: int, shield: Any) -> None:
-    """Refuse a second wrapper of a team, which would mend the first one's commands, and one shield for both teams."""
+    """Refuse a second shield for a team, which would filter the first one's commands, and one shield for both teams."""
     others = [layer for layer in layers_of(env) if isinstance(layer, ShieldedParallelEnv)]
     if any(layer.shield is shield for layer in others):
         raise ConfigError("this shield serves the other team of this environment; give each team a Shield of its own")

@@ -1,4 +1,4 @@
-"""The shield around a policy instead of an environment: what the policy answers is already safe."""
+"""The shield around a policy instead of an environment: the policy's answers are filtered."""
 
 from __future__ import annotations
 
@@ -22,14 +22,15 @@ logger = logging.getLogger(__name__)
 class ShieldedTeamPolicy:
     """A team policy (``reset(env, agent_ids, seed)``, ``act(observations, infos)``) whose commands pass the shield.
 
-    Only the policy's own commands do: boats the game drives itself are out of its reach. `ShieldedParallelEnv` on our
-    env covers those too. Where the game moves its boats several times for an answer, that decides before each move, and
-    this once for all: the shield is told that commands are held (`ShieldConfig.move_s`). In a Pyquaticus env all its
-    answers are (speed m/s, relative heading deg) pairs, since that env takes actions of one kind only from a boat.
+    The shield reaches only the policy's own commands, not game-controlled boats. `ShieldedParallelEnv` on our env
+    covers those too. If the game moves its boats several times for an action, this shield decides once for all
+    substeps, and its predictions hold the command (`ShieldConfig.move_s`). `ShieldedParallelEnv` decides before each
+    substep. In a Pyquaticus env all answers are (speed m/s, relative heading deg) pairs, because that env accepts one
+    kind of action from a boat.
 
     Attributes:
         policy: the policy inside.
-        shield: its shield: the one given, or one with the game's distances, see `ShieldedParallelEnv`.
+        shield: its shield: the given one, or a copy with the game's distances, see `ShieldedParallelEnv`.
         decisions: the last decisions, or None.
 
     Raises:
@@ -52,8 +53,9 @@ class ShieldedTeamPolicy:
         """Begin a game.
 
         Raises:
-            ConfigError: the env cannot be read, has settings that no shield can be built for, or takes no answers of
-                ours; the shield is for another step; or the boats are none, not in the game, or of two teams.
+            ConfigError: the env cannot be read, has settings that no shield can be built for, or does not accept pairs
+                from these boats; the shield is for another step; or ``agent_ids`` is empty, names boats that are not in
+                the game, or boats of both teams.
         """
         reader = reader_of(env)
         team = _team_of(reader, agent_ids)
@@ -64,14 +66,15 @@ class ShieldedTeamPolicy:
         self.policy.reset(env, agent_ids, seed)
 
     def act(self, observations: Mapping[str, Any], infos: Mapping[str, Any]) -> dict[str, Any]:
-        """Actions of the boats; those the shield had to change are (speed m/s, relative heading deg) pairs.
+        """Return the boats' actions. Those that the shield changed are (speed m/s, relative heading deg) pairs.
+
+        Exceptions of the policy itself pass through: the caller decides what to send then.
 
         Raises:
-            PolicyError: `reset` has not been called, another game is played than the one it was called with, or the
-                policy answered no mapping.
-            GameError: an answer is no action: not finite, True or False, of another length, the name of no field point.
-                What the policy itself raises comes out as it is: nothing is sent, and whoever plays decides what then.
-            ConfigError: the env was set since then to what the shield is not for, or it has begun to serve others.
+            PolicyError: `reset` has not been called, another game is played than the one given to it, or the policy's
+                answer is no mapping.
+            GameError: an answer is no action: not finite, True or False, of another length, or an unknown field point.
+            ConfigError: the env's settings have changed since the reset, or the shield has begun to serve someone else.
         """
         if self._game is None:
             raise PolicyError("call reset(env, agent_ids, seed) before act()")
@@ -98,9 +101,9 @@ class ShieldedTeamPolicy:
         return f"<{self.name}: {words_of(self.shield)}>"
 
     def _check_played(self, moment: float, observations: Mapping[str, Any]) -> None:
-        """Check that the game whose positions are read is the one that is played: it moves on when what is shown does.
+        """Refuse to play if the observations change while the game that is read stands still.
 
-        A copy of a wrapped policy takes a copy of its game along, which nobody plays.
+        This happens to a copy of a wrapped policy: it holds a copy of its game, which nobody plays.
         """
         seen = observations.get(self._agent_ids[0]) if isinstance(observations, Mapping) else None
         shown = np.array(seen, dtype=object, copy=True)
@@ -112,14 +115,14 @@ class ShieldedTeamPolicy:
             )
 
     def __getattr__(self, name: str) -> Any:
-        # "policy" is not set yet: no looking it up on itself; and the policy's own way of copying knows no shield
+        # "policy" is not set yet while copying; and the policy's own copy methods do not know the shield
         if name == "policy" or name.startswith("__"):
             raise AttributeError(name)
         return getattr(self.policy, name)
 
 
 def _team_of(reader: GameReader, agent_ids: Sequence[str]) -> int:
-    """The team of the boats, which must be of one."""
+    """Return the team of the boats, which must be the same for all."""
     for agent in agent_ids:
         if agent not in reader.agent_ids:
             raise ConfigError(f"unknown boat {agent!r}; the game has {', '.join(reader.agent_ids)}")
@@ -132,7 +135,7 @@ def _team_of(reader: GameReader, agent_ids: Sequence[str]) -> int:
 
 
 class ShieldedCallable:
-    """Any function of what is seen to commands, with the fleet read from what is seen.
+    """Any function from an observation to commands, with the fleet read from the same observation.
 
     Args:
         policy: ``policy(seen) -> Commands`` for all boats of the fleet.
@@ -140,7 +143,7 @@ class ShieldedCallable:
         read: ``read(seen) -> Fleet``.
 
     Raises:
-        ConfigError: the shield or ``read`` is none.
+        ConfigError: ``shield`` is no shield, or ``read`` is no function.
     """
 
     def __init__(self, policy: Callable[[Any], Commands], shield: Shield, read: Callable[[Any], Fleet]) -> None:
@@ -155,15 +158,15 @@ class ShieldedCallable:
         self._failure = ""
 
     def __call__(self, seen: Any) -> Commands:
-        """Safe commands, in the frame of the policy's last usable answer.
+        """Return filtered commands, in the frame of the policy's last usable answer.
 
-        A policy that raises or answers something else holds all boats, and a command that is not finite holds its own;
-        the reason says so, and the log once for each thing that is wrong. Before the first usable answer the frame is
-        that of `Commands.relative_deg`.
+        If the policy raises or answers something else, all boats hold. A command that is not finite makes its own boat
+        hold. The decision's reason says so, and the log once for each failure. Before the first usable answer the frame
+        is that of `Commands.relative_deg`.
 
         Raises:
             ConfigError: the shield serves another function, team or game since its last `Shield.reset`.
-            FleetError: ``read`` gave no fleet.
+            FleetError: ``read`` returned no fleet.
         """
         fleet = self.read(seen)
         self._serving.check()
@@ -178,7 +181,7 @@ class ShieldedCallable:
             named = ", ".join(repr(fleet.names[i]) for i in rows)
             self._note(f"commands of {named} are not finite; they hold" if named else "")
             self._relative = wanted.relative
-        except Exception as error:  # whatever a policy does, its boats must get commands
+        except Exception as error:  # whatever the policy does, its boats must get commands
             self._note(f"{type(error).__name__}: {error}; all boats hold")
             nothing = np.full((len(fleet), 2), np.nan)
             wanted = Commands.relative_deg(nothing) if self._relative else Commands.absolute_rad(nothing)
@@ -189,7 +192,7 @@ class ShieldedCallable:
         return f"<shielded {getattr(self.policy, '__name__', type(self.policy).__name__)}: {words_of(self.shield)}>"
 
     def _note(self, failure: str) -> None:
-        """Log a failure when it begins, or becomes another one, and when it is over."""
+        """Log a failure when it begins or changes, and when it is over."""
         if failure and failure != self._failure:
             logger.error("policy failed: %s", failure)
         if self._failure and not failure:

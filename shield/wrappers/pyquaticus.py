@@ -1,4 +1,4 @@
-"""Reading a real Pyquaticus environment object; settings that a shield would misread are refused by name."""
+"""Reading of a Pyquaticus environment; settings that a shield would misread are refused by name."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from .mctf import surroundings
 from .readers import game_reader
 
 NEEDED = ("agent_radius", "dynamics", "env_size", "flag_keepout_radius", "flags", "players", "_move_agents")
-"""Attributes of the environment without which it cannot be read, or its boats' commands not be reached."""
+"""Attributes without which the environment cannot be read or its boats' commands cannot be reached."""
 
 _NAMES = """
 gps_env env_bounds env_bounds_unit blue_flag_home red_flag_home flag_homes_unit scrimmage_coords scrimmage_coords_unit
@@ -38,7 +38,7 @@ render_lidar_mode render_saving render_transparency_alpha suppress_numpy_warning
 """
 
 KNOWN_SETTINGS = frozenset(_NAMES.split())
-"""Settings whose effect on boats is read from the environment, or is none; of others nobody knows what they do."""
+"""Settings whose effect on boats is read from the environment, or that have none. The effect of others is unknown."""
 
 _OF_PLAYERS = {
     "max_speed": "max_speed_mps",
@@ -56,14 +56,14 @@ _OF_PLAYERS = {
 
 @game_reader(lambda env: hasattr(env, "players") and hasattr(env, "flag_homes") and not hasattr(env, "core"))
 class PyquaticusReader:
-    """Reads a ``PyQuaticusEnv``: true positions and autopilot memory of every player.
+    """Reader of a ``PyQuaticusEnv``: true positions and autopilot memory of every player.
 
-    The environment drives tagged and out-of-bounds boats itself, after the policy's action, and stops disabled ones:
-    those are not ours to decide for, and are predicted as what they are.
+    The environment itself controls tagged and out-of-bounds boats, after the policy's action, and stops disabled ones.
+    The shield does not decide for those, and predicts what the environment makes them do.
 
     Raises:
         ConfigError: the environment has settings that a shield would misread.
-        PlatformError: it has boats that nobody knows here.
+        PlatformError: it has boats that are no known platform.
     """
 
     takes_pairs_only = True
@@ -75,10 +75,10 @@ class PyquaticusReader:
         self._platforms = platforms_of_players(env)
 
     def facts(self) -> GameFacts:
-        """Step and sizes, as the environment has them now.
+        """Return step and sizes, as the environment has them at this moment.
 
         Raises:
-            ConfigError: it has settings by now that a shield would misread.
+            ConfigError: it now has settings that a shield would misread.
         """
         check_env(self.env)
         self._platforms = platforms_of_players(self.env)
@@ -89,9 +89,9 @@ class PyquaticusReader:
 
     @contextmanager
     def filtering(self, safe: Callable[[Array], Array]) -> Iterator[None]:
-        """While inside, what the environment read from the actions passes ``safe`` each time before its boats move.
+        """While inside, commands pass ``safe`` each time before the boats move.
 
-        Actions are looked at first, so that those which are none are refused in the same words everywhere.
+        Actions are read first, so that invalid ones raise the same errors as everywhere else.
         """
         env = self.env
         step, move = env.step, env._move_agents
@@ -113,10 +113,12 @@ class PyquaticusReader:
             yield
 
     def check_answers(self, agent_ids: Sequence[str]) -> None:
-        """Check that the environment plays pairs: if a boat's first action was of its declared space, all must be.
+        """Check that the environment will accept pairs from the boats.
+
+        If a boat's first action was of its declared space, all its actions must be.
 
         Raises:
-            ConfigError: a boat is bound to other actions.
+            ConfigError: a boat must play other actions.
         """
         checked, match = (getattr(self.env, f"act_space_{name}", {}) for name in ("checked", "match"))
         for agent in agent_ids:
@@ -128,11 +130,11 @@ class PyquaticusReader:
                 )
 
     def moment(self) -> float:
-        """Time of the game, s."""
+        """Return the game's time, s."""
         return float(self.env.current_time)
 
     def fleet(self, team: int, shield_autopilot: bool) -> Fleet:
-        """All boats now."""
+        """Return all boats."""
         players = list(self.env.players.values())
         state = np.array([_row(player) for player in players])
         teams = self._teams()
@@ -152,7 +154,7 @@ class PyquaticusReader:
         return np.array([int(getattr(team, "value", team)) for team in teams], dtype=np.int64)
 
     def commands(self, actions: Mapping[str, Any]) -> Array:
-        """Commands of actions of any kind; boats without one stop, as in the env."""
+        """Return the commands of actions of any kind; boats without one stop, as in the env."""
         check_agents(actions, self.agent_ids)
         values = np.zeros((len(self.agent_ids), 2))
         for i, agent in enumerate(self.agent_ids):
@@ -161,9 +163,10 @@ class PyquaticusReader:
         return values
 
     def playable(self, actions: Mapping[str, Any]) -> dict[str, Any]:
-        """The actions in a form the env takes: plain numbers, pairs and names as they are, others made plain.
+        """Return the actions in a form the env accepts: numbers, pairs and names unchanged, others made plain.
 
-        It looks whole numbers up in a list, so that arrays without axes, tensors and whole floats are none to it.
+        The env looks whole numbers up in a list, so it does not accept arrays without axes, tensors or whole-valued
+        floats.
         """
         return {
             agent: action if _is_playable(action) else plain_action(self._seat(agent), action)
@@ -171,7 +174,7 @@ class PyquaticusReader:
         }
 
     def _seat(self, agent: str) -> Seat:
-        """The env looks numbers up in a list, by Python's rules, and takes the first two entries of anything longer."""
+        """Return the rules for a boat's actions, as in the env: Python's list indices, first two of more entries."""
         player = self.env.players[agent]
         points = tuple(getattr(self.env, "aquaticus_field_points", None) or ())
         return Seat(
@@ -185,7 +188,7 @@ class PyquaticusReader:
         )
 
     def surroundings(self, team: int, keep_out: bool) -> Surroundings:
-        """Field edge and obstacles; the own flag's circle, see `mctf.surroundings_of`."""
+        """Return field edge, obstacles and the own flag's circle, see `mctf.surroundings_of`."""
         env, shapes = self.env, getattr(self.env, "obstacles", ())
         circles = tuple((*map(float, one.center_point), float(one.radius)) for one in shapes if hasattr(one, "radius"))
         corners = (one.anchor_points for one in shapes if hasattr(one, "anchor_points"))
@@ -196,7 +199,7 @@ class PyquaticusReader:
 
 @contextmanager
 def _standing_in(thing: Any, name: str, value: Any) -> Iterator[None]:
-    """The object's attribute is this while inside, and afterwards what it was."""
+    """Replace an attribute of an object while inside, and restore it afterwards."""
     before = vars(thing).get(name)
     setattr(thing, name, value)
     try:
@@ -214,7 +217,7 @@ def _to_point(env: Any, name: str, player: Any) -> Command:
 
 
 def _is_playable(action: Any) -> bool:
-    """Whether it is a plain number, a name or a pair of plain numbers."""
+    """Return whether an action is a plain number, a name or a pair of plain numbers."""
     if isinstance(action, np.ndarray):
         return action.shape == (2,)
     pair = isinstance(action, (list, tuple)) and len(action) == 2 and all(isinstance(one, Real) for one in action)
@@ -222,7 +225,7 @@ def _is_playable(action: Any) -> bool:
 
 
 def _row(player: Any) -> Array:
-    """State row of a player, with its controllers' memory where it has any."""
+    """Return the state row of a player, with its controllers' memory where it has any."""
     row = np.zeros(L.N_STATE)
     row[L.X], row[L.Y] = player.pos[0], player.pos[1]
     row[L.HEADING], row[L.SPEED] = player.heading, player.speed
@@ -243,7 +246,7 @@ def _controller(player: Any, name: str) -> tuple[float, float]:
 
 
 def _driven(players: Sequence[Any]) -> tuple[BoolArray, BoolArray, BoolArray]:
-    """Which boats the environment drives: tagged, out of bounds, disabled, each (n,) bool."""
+    """Return which boats the environment controls: tagged, out of bounds, disabled; each (n,) bool."""
     tagged, oob, disabled = (
         np.array([bool(getattr(player, name, False)) for player in players])
         for name in ("is_tagged", "oob", "is_disabled")
@@ -252,10 +255,11 @@ def _driven(players: Sequence[Any]) -> tuple[BoolArray, BoolArray, BoolArray]:
 
 
 def driven_players(env: Any, players: Sequence[Any], state: Array, team: IntArray) -> Array | None:
-    """Rows of `Fleet.driven` of all players; None where the environment drives none.
+    """Return rows of `Fleet.driven` for all players; None if the environment controls none.
 
-    Home is the own flag's, or where there are corners the nearer of their marks. It leads tagged boats past obstacles
-    by a random planner, and of versions without the radius nobody knows when they are home.
+    Home is the own flag, or the nearer corner mark where the environment has those. With obstacles a random planner
+    leads tagged boats, so their way is unknown. It is also unknown in versions without the catch radius, where the end
+    of the way cannot be told.
     """
     driven = _driven(players)
     if not np.any(driven):
@@ -279,7 +283,7 @@ def driven_players(env: Any, players: Sequence[Any], state: Array, team: IntArra
 
 
 def _disabled_for_s(env: Any, team: int) -> float:
-    """Time until the power play that stops a team's boats ends, s; 0, which is to say nothing, where it is not told."""
+    """Return how long the power play still stops a team's boats, s; 0 (no claim) if the env does not report it."""
     start = getattr(env, ("blue_power_start", "red_power_start")[team], None)
     length = getattr(env, "power_play_length", None)
     if start is None or length is None:
@@ -310,7 +314,7 @@ def check_env(env: Any) -> None:
 
 
 def moves_of(env: Any) -> int:
-    """Moves that the environment makes of one action: those of its speed-up, and with a window open of its frames."""
+    """Return the substeps of one action: the speed-up, times the frames of a step if a window is open."""
     speedup = getattr(env, "sim_speedup_factor", 1)
     if isinstance(speedup, bool) or not isinstance(speedup, (int, np.integer)) or speedup < 1:
         raise ConfigError(f"sim_speedup_factor = {speedup!r} is not supported; give a whole number of steps, 1 or more")
@@ -319,7 +323,7 @@ def moves_of(env: Any) -> int:
 
 
 def step_of(env: Any) -> float:
-    """Time that one command moves the boats by, s: with a window open a frame, else a step."""
+    """Return the length of a substep, s: a frame if a window is open, otherwise a step."""
     whole = getattr(env, "dt", getattr(env, "tau", None))
     steps = {float(step) for step in (getattr(player, "dt", whole) for player in env.players.values()) if step}
     if len(steps) != 1:
@@ -331,7 +335,7 @@ def step_of(env: Any) -> float:
 
 
 def platforms_of_players(env: Any) -> tuple[str, ...]:
-    """Names of the boats' platforms, which must be as they are here."""
+    """Return the names of the boats' platforms; refuse boats that differ from them."""
     kinds = [get_platform(name) for name in env.dynamics]
     if len(kinds) != len(env.players):
         raise ConfigError(f"dynamics names {len(kinds)} boats of {len(env.players)}; give one for each")

@@ -1,6 +1,6 @@
-"""Reading a game: how the shield gets absolute positions and commands out of an environment object.
+"""Readers: how the shield gets absolute positions and commands from an environment.
 
-Positions come from the environment itself, never from observations: those are relative, rounded and may be normalised.
+Positions come from the environment itself. Observations are relative, rounded and may be normalised.
 """
 
 from __future__ import annotations
@@ -22,56 +22,58 @@ class GameReader(Protocol):
 
     agent_ids: tuple[str, ...]
     takes_pairs_only: bool
-    """Whether, once a boat has had a (speed, relative heading) pair, all its actions must be pairs."""
+    """Whether a boat that has played a (speed, relative heading) pair must play pairs from then on."""
 
     def facts(self) -> GameFacts:
-        """Step and sizes.
+        """Return step and sizes.
 
         Raises:
             ConfigError: the game has settings that no shield can be built for.
         """
 
     def filtering(self, safe: Callable[[Array], Array]) -> AbstractContextManager[None]:
-        """While inside, commands (n, 2) pass ``safe`` before the boats move; afterwards the game is as it was."""
+        """While inside, commands (n, 2) pass ``safe`` before the boats move. The game is restored afterwards."""
 
     def check_answers(self, agent_ids: Sequence[str]) -> None:
-        """Check that the game plays what a shield around a policy answers, one command a step.
+        """Check that the game accepts the answers of a shield around a policy: one command per action.
 
         Raises:
             ConfigError: it does not.
         """
 
     def moment(self) -> float:
-        """Time of the game, s: it is another after every step."""
+        """Return the game's time, s. It must change in every step."""
 
     def fleet(self, team: int, shield_autopilot: bool) -> Fleet:
-        """All boats now; controlled are those of ``team`` that the shield can decide for."""
+        """Return all boats. Controlled are those of ``team`` that the shield can decide for."""
 
     def commands(self, actions: Mapping[str, Any]) -> Array:
-        """(n, 2) speed m/s and relative heading deg of the actions, as the game plays them; missing boats stop.
+        """Return the commands (n, 2) of the actions, as the game plays them: speed m/s, relative heading deg.
+
+        Boats without an action stop.
 
         Raises:
-            GameError: an action is none, or of no boat of the game.
+            GameError: an action is invalid, or is for no boat of the game.
         """
 
     def playable(self, actions: Mapping[str, Any]) -> dict[str, Any]:
-        """The actions in a form the environment itself takes; those it takes already are the very same objects."""
+        """Return the actions in a form the environment accepts; those that it accepts already are the same objects."""
 
     def surroundings(self, team: int, keep_out: bool) -> Surroundings:
-        """Field edge, obstacles and (with ``keep_out``) the own flag's circle."""
+        """Return field edge, obstacles and (with ``keep_out``) the own flag's circle."""
 
 
 GROUP = "steerclear.readers"
-"""Entry points of this group name modules of other packages in which readers are registered."""
+"""Entry-point group of other packages: each entry names a module that registers readers."""
 Build = TypeVar("Build", bound=Callable[[Any], GameReader])
 _REGISTERED: dict[Callable[[Any], bool], Callable[[Any], GameReader]] = {}
 
 
 def game_reader(fits: Callable[[Any], bool]) -> Callable[[Build], Build]:
-    """Register a reader: put above its class, or a function that builds one from the environment.
+    """Register a reader: decorates its class, or a function that builds one from the environment.
 
     Args:
-        fits: whether an environment, without its wrappers, is one that this reader reads.
+        fits: returns whether this reader reads an environment, given without its wrappers.
     """
 
     def register(build: Build) -> Build:
@@ -82,10 +84,10 @@ def game_reader(fits: Callable[[Any], bool]) -> Callable[[Build], Build]:
 
 
 def reader_of(env: Any) -> GameReader:
-    """The reader for an environment; registered ones are asked first, the latest before the others.
+    """Return the reader for an environment. The reader registered last is tried first.
 
     Raises:
-        ConfigError: nobody reads it.
+        ConfigError: no reader fits.
     """
     load_others(GROUP)
     base = getattr(env, "unwrapped", env)

@@ -1,4 +1,4 @@
-"""What happened to learners: events of a decision, and totals of a game."""
+"""Counts of what happened to learners: events of a decision, totals of a game."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..decision import Reason
 from ..jit import Array, BoolArray
 
 TEAM_EVENTS = ("captures", "grabs", "tags", "captures_against", "grabs_against", "tags_against")
-"""Events of both teams; each learner of a team has its team's numbers."""
+"""Events of a team and of its opponents; every learner of a team has its team's numbers."""
 OWN_EVENTS = ("hits", "interventions")
 """New collisions of the boat itself, and game steps in which the shield changed its command."""
 EVENTS = (*TEAM_EVENTS, *OWN_EVENTS)
@@ -26,10 +26,10 @@ class Tallies:
         boats: numbers of its boats.
 
     Attributes:
-        step: (8, B, n) counts of the decision under way, in the order of `EVENTS`.
-        totals: the same of the games under way.
-        reward: (B, n) their rewards so far.
-        length: (B,) their decisions so far.
+        step: (8, B, n) counts of the current decision, in the order of `EVENTS`.
+        totals: the same, of the current games.
+        reward: (B, n) rewards so far.
+        length: (B,) decisions so far.
     """
 
     def __init__(self, core: Any, team: int, boats: Any) -> None:
@@ -41,11 +41,16 @@ class Tallies:
         self.length = np.zeros(core.n_games, np.int64)
 
     def begin_decision(self) -> None:
-        """Count a new decision."""
+        """Begin the counts of a new decision."""
         self.step[:] = 0.0
 
     def count(self, going: BoolArray, changed: BoolArray) -> None:
-        """Count one game step of the games that go on (B,); ``changed`` (B, n): the shield's changes."""
+        """Count one game step.
+
+        Args:
+            going: (B,) games that have not ended in this decision.
+            changed: (B, n) commands that the shield changed.
+        """
         events, own = self._core.events, self._team
         for k in range(3):
             self.step[k] += (events[:, own, k] * going)[:, None]
@@ -54,29 +59,29 @@ class Tallies:
         self.step[7] += changed & going[:, None]
 
     def end_decision(self, rewards: Array) -> None:
-        """Add the decision to its games."""
+        """Add the current decision to the games' totals."""
         self.totals += self.step
         self.reward += rewards
         self.length += 1
 
     def forget(self, games: Any) -> None:
-        """Begin the games (B,) bool anew."""
+        """Reset the totals of games (B,) bool."""
         self.totals[:, games] = 0.0
         self.reward[games] = 0.0
         self.length[games] = 0
 
     def flat_step(self) -> dict[str, Array]:
-        """Counts (L,) of the last decision by name."""
+        """Return counts (L,) of the last decision by name."""
         return {name: self.step[k].reshape(-1).copy() for k, name in enumerate(EVENTS)}
 
     def flat_totals(self) -> dict[str, Array]:
-        """Counts (L,) of the games under way by name, with ``r`` reward and ``l`` decisions."""
+        """Return counts (L,) of the current games by name, with ``r`` reward and ``l`` decisions."""
         totals = {name: self.totals[k].reshape(-1).copy() for k, name in enumerate(EVENTS)}
         return {"r": self.reward.reshape(-1).copy(), "l": np.repeat(self.length, len(self._boats)), **totals}
 
 
 def changed_by(shield: Any, boats: Any, shape: tuple[int, int]) -> BoolArray:
-    """(B, n) which of the boats' commands the shield changed at its last decision."""
+    """Return (B, n) which of the boats' commands the shield changed in its last decision."""
     if shield is None:
         return np.zeros(shape, np.bool_)
     changed: BoolArray = ~np.isin(shield.reason[:, boats], UNCHANGED)

@@ -1,4 +1,4 @@
-"""One team's boats in many games as a flat batch of learners: what both vector environments are made of."""
+"""One team's boats in many games as a flat batch of learners; both vector environments use it."""
 
 from __future__ import annotations
 
@@ -21,41 +21,41 @@ from .tallies import Tallies, changed_by
 
 ACTIONS = ("discrete", "continuous", "normalised")
 MOST_INTERVAL = 1000
-"""Steps of the game a decision is held for at most."""
+"""Most game steps for which a decision may be held."""
 
 
 class Stepped(NamedTuple):
     """Outcome of a step for the L = games * boats learners."""
 
     observations: NDArray[np.float32]  # (L, n_obs) float32, of the new game where one ended
-    rewards: Array  # (L,)
+    rewards: Array  # (L, n_obs); of the new game where one ended
     terminated: BoolArray  # (L,) the game was won
-    truncated: BoolArray  # (L,) its time was over
-    final_observations: NDArray[np.float32]  # (L, n_obs) before a new game began; only rows of ended games matter
-    events: Mapping[str, Array] = {}  # what happened in the decision, by name of `tallies.EVENTS`, each (L,)
-    # totals of the games under way, ended ones included, each (L,): ``r`` reward, ``l`` decisions, ``t`` s since the
-    # batch was made, and the same names
+    truncated: BoolArray  # (L,) the game won
+    final_observations: NDArray[np.float32]  # (L,) the time ran out
+    events: Mapping[str, Array] = {}  # (L, n_obs) before a new game began; only rows of ended games matter
+    # events of the decision, by name of `tallies.EVENTS`, each (L,)
+    # batch was made, and the names of `tallies.EVENTS`
     episodes: Mapping[str, Array] = {}
 
 
 class TeamBatch:
-    """Learners are the boats of one team in B games of a `BatchedMctf`; the other team is played by a batch policy.
+    """The boats of one team in B games of a `BatchedMctf` as learners. A batch policy plays the other team.
 
     Args:
         core: the `BatchedMctf`.
-        opponent: batch policy (`steerclear.policies.make_batch`) of the other team; None: they hold still.
+        opponent: batch policy (`steerclear.policies.make_batch`) of the other team; None: its boats hold still.
         team: "blue" or "red", the learners' side.
         shield: shield for the learners' team, or None.
         actions: "discrete" (17 numbers), "continuous" (speed m/s, relative heading deg) or "normalised" (the same, each
-            in [-1, 1]: stop to top speed, -180 to 180 deg).
+            scaled to [-1, 1]: stop to top speed, -180 to 180 deg).
         seed: seed of games and opponent.
-        interval: game steps for which a decision is held, as a course steered; the shield looks at every one of them.
-        reward: what rewards the learners instead of the game's own reward: an object with ``begin(batch, games)`` for
-            games (B,) that begin anew and ``reward(batch, changed)`` for every game step, which answers (B, n).
+        interval: game steps for which a decision is held, as a steered course; the shield filters each step.
+        reward: replaces the game's own reward: an object with ``begin(batch, games)`` for games (B,) that begin anew,
+            and ``reward(batch, changed)`` for every game step, which returns (B, n).
 
     Raises:
-        ConfigError: unknown team or kind of actions, an opponent for single games, or a shield that is none of these
-            games.
+        ConfigError: unknown team or kind of actions, an opponent for single games, or a shield that was not built for
+            these games.
     """
 
     def __init__(
@@ -89,7 +89,7 @@ class TeamBatch:
         if shield is not None:
             check_games(shield, core)
         self._filter: Any = None if shield is None else shield.filter_for(self.team)
-        self._games_filter = self._filter  # of the games themselves: what learns may put another in its place
+        self._games_filter = self._filter  # the shield's own filter; training may replace self._filter
         self._commands = np.zeros((core.n_games, core.n_boats, 2))
         self._seed = seed
         self._born_s = time.perf_counter()
@@ -101,13 +101,13 @@ class TeamBatch:
         return float(np.max(self.core.max_speed_mps[self.boats]))
 
     def reset(self, seed: int | None = None) -> NDArray[np.float32]:
-        """Start all games; returns observations (L, n_obs).
+        """Start all games and return observations (L, n_obs).
 
         Args:
             seed: seed of games and opponent; None: the last one.
 
         Raises:
-            ConfigError: no seed.
+            ConfigError: the seed is not a whole number from 0.
         """
         if seed is not None and (isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0):
             raise ConfigError(f"seed is {seed!r}; give one whole number from 0 for all games, or None")
@@ -121,7 +121,7 @@ class TeamBatch:
         return self._flat(observations)
 
     def step(self, actions: Any) -> Stepped:
-        """One decision of all learners, held for `interval` game steps; games that end in it start anew.
+        """Play one decision of all learners, held for `interval` game steps. Games that end in it start anew.
 
         Raises:
             PolicyError: the actions have the wrong shape, are out of range or not finite.
@@ -157,10 +157,10 @@ class TeamBatch:
         return Stepped(seen, rewards.reshape(-1), *outcome, final, self.tallies.flat_step(), episodes)
 
     def action_masks(self) -> BoolArray:
-        """(L, 17) which discrete actions the shield would let pass as they are, in the next game step.
+        """Return which discrete actions (L, 17) the shield would pass unchanged in the next game step.
 
-        Each is judged beside teammates that go straight on; without a shield all pass, and so they do for a boat of
-        which none does: then the shield decides.
+        Each is judged on the assumption that teammates go straight on. All pass without a shield, and for a boat of
+        which none would pass: there the shield decides.
 
         Raises:
             ConfigError: actions are not discrete.
@@ -178,7 +178,7 @@ class TeamBatch:
         return passes
 
     def _move(self, own: Array, going: BoolArray) -> tuple[Any, Array]:
-        """One game step; observations of all games and the learners' rewards (B, n)."""
+        """Play one game step and return observations of all games and the learners' rewards (B, n)."""
         self._commands[:, self.boats] = own
         if self.opponent is not None:
             self._commands[:, self.others] = self.opponent.act(self.core, 1 - self.team)
@@ -190,21 +190,21 @@ class TeamBatch:
         return observations, rewards[:, self.boats]
 
     def _heading_deg(self) -> Array:
-        """(B, n) headings of the learners' boats, deg."""
+        """Return headings (B, n) of the learners' boats, deg."""
         return np.array(self.core.state[:, self.boats, L.HEADING])
 
     def _begin_counts(self, games: BoolArray) -> None:
-        """Count games (B,) that begin from nought."""
+        """Reset the counts of games (B,) that begin anew."""
         self.tallies.forget(games)
         if self.reward is not None:
             self.reward.begin(self, games)
 
     def restart(self, games: BoolArray) -> NDArray[np.float32]:
-        """Start the chosen games (B,) anew, each with its own random numbers going on; observations of all."""
+        """Start the chosen games (B,) anew and return observations of all. Each game's random numbers continue."""
         return self._begin_anew(games, self._flat(self.core.observations))
 
     def _begin_anew(self, ended: BoolArray, final: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Start the games in ``ended`` (B,)."""
+        """Start the games in ``ended`` (B,) anew."""
         if not ended.any():
             return final
         observations = self.core.reset(mask=ended)
@@ -220,7 +220,7 @@ class TeamBatch:
         return seen
 
     def _decode(self, actions: Any) -> Array:
-        """Commands (B, boats, 2) of flat actions."""
+        """Return commands (B, boats, 2) of flat actions."""
         pairs = self.actions != "discrete"
         top_mps = np.tile(self.core.max_speed_mps[self.boats], self.core.n_games)
         if self.actions == "normalised":
@@ -240,7 +240,7 @@ class TeamBatch:
 
 
 def _in_units(actions: Any, top_mps: Array) -> Any:
-    """Speed m/s and relative heading deg of actions in [-1, 1], which are clipped to that; nonsense stays nonsense."""
+    """Return speed m/s and relative heading deg of actions, clipped to [-1, 1]; invalid ones are returned unchanged."""
     try:
         given = numbers(actions)
     except NoNumbersError:

@@ -14,7 +14,7 @@ from .team_batch import TeamBatch
 
 
 def spaces_of(batch: TeamBatch) -> tuple[Space[Any], Space[Any]]:
-    """Observation and action space of one learner."""
+    """Return observation and action space of one learner."""
     observation = Box(-1.0, 1.0, (batch.core.n_obs,), np.float32)
     if batch.actions == "discrete":
         return observation, Discrete(17)
@@ -25,11 +25,11 @@ def spaces_of(batch: TeamBatch) -> tuple[Space[Any], Space[Any]]:
 
 
 class MctfVectorEnv(VectorEnv[Any, Any, Any]):
-    """Every boat of one team in every game is one sub-environment.
+    """Gymnasium vector environment in which every boat of one team in every game is one sub-environment.
 
-    Games that end start anew in the same step. Infos of a step hold what happened, by name of `tallies.EVENTS`, each
-    (num_envs,), and where games ended ``final_obs`` and ``totals``: reward ``r``, decisions ``l``, seconds ``t`` and
-    the game's totals, each with its mask ``_totals``; ``episode`` is left to Gymnasium's own wrappers.
+    Games that end start anew in the same step. Infos of a step hold the events by name of `tallies.EVENTS`, each
+    (num_envs,). Where games ended, infos also hold ``final_obs`` and ``totals``: reward ``r``, decisions ``l``, seconds
+    ``t`` and the game's counts, with the mask ``_totals``. The key ``episode`` is left to Gymnasium's own wrappers.
 
     Args:
         batch: the games, see `TeamBatch`.
@@ -45,17 +45,17 @@ class MctfVectorEnv(VectorEnv[Any, Any, Any]):
         self.action_space = batch_space(self.single_action_space, self.num_envs)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Start all games; game b draws the same numbers of a seed however many there are.
+        """Start all games. Game b draws the same random numbers for a seed, whatever the number of games.
 
         Raises:
-            ConfigError: options, of which there are none, or a list of seeds.
+            ConfigError: options were given, or a list of seeds.
         """
         if options:
             raise ConfigError(f"unknown reset options {', '.join(options)}; how games start is in their GameConfig")
         return self.batch.reset(seed), {}
 
     def action_masks(self) -> Any:
-        """(num_envs, 17) actions the shield would let pass in the next game step, see `TeamBatch.action_masks`."""
+        """Return actions (num_envs, 17) that the shield would pass in the next step, see `TeamBatch.action_masks`."""
         return self.batch.action_masks()
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:

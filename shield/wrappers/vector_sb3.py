@@ -14,10 +14,10 @@ from .vector_gym import spaces_of
 
 
 class MctfVecEnv(VecEnv):
-    """Every boat of one team in every game is one sub-environment of SB3; one policy learns to play them all.
+    """SB3 vector environment in which every boat of one team in every game is one sub-environment.
 
-    An info holds the events of `tallies.EVENTS` that happened to the learner, and where its game ended ``episode``,
-    which SB3's own statistics read, with the game's totals.
+    One policy learns to play them all. An info holds the learner's events, by name of `tallies.EVENTS`. Where its game
+    ended, ``episode`` holds the game's totals, which SB3's own statistics read.
 
     Args:
         batch: the games, see `TeamBatch`.
@@ -30,10 +30,10 @@ class MctfVecEnv(VecEnv):
         super().__init__(batch.learners, *spaces_of(batch))
 
     def reset(self) -> Any:
-        """Start all games; observations (L, n_obs).
+        """Start all games and return observations (L, n_obs).
 
         Raises:
-            ConfigError: options were set, of which these games have none.
+            ConfigError: options were set; these games have none.
         """
         seed = next((seed for seed in self._seeds if seed is not None), None)
         given = sorted({str(name) for options in self._options for name in options})
@@ -44,17 +44,17 @@ class MctfVecEnv(VecEnv):
         return self.batch.reset(seed)
 
     def step_async(self, actions: Any) -> None:
-        """Take the learners' actions."""
+        """Store the learners' actions."""
         self._actions = actions
 
     def step_wait(self) -> tuple[Any, Any, Any, list[dict[str, Any]]]:
-        """Step all games; ended ones start anew, with their last observation in the info."""
+        """Step all games. Ended ones start anew, with their last observation in the info."""
         out = self.batch.step(self._actions)
         done = out.terminated | out.truncated
         return out.observations, out.rewards.astype(np.float32), done, self._infos(out, done)
 
     def _infos(self, out: Stepped, done: Any) -> list[dict[str, Any]]:
-        """What happened, only where something did: most learners of most steps have nothing to tell."""
+        """Return the infos. They hold non-zero counts only, because most learners have no events in most steps."""
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         for name, counts in out.events.items():
             for i in np.flatnonzero(counts):
@@ -68,14 +68,14 @@ class MctfVecEnv(VecEnv):
         return infos
 
     def action_masks(self) -> Any:
-        """(L, 17) actions the shield would let pass, as sb3-contrib's MaskablePPO asks for them; see `TeamBatch`."""
+        """Return actions (L, 17) that the shield would pass; MaskablePPO of sb3-contrib uses them. See `TeamBatch`."""
         return self.batch.action_masks()
 
     def close(self) -> None:
-        """Nothing to give back."""
+        """Do nothing: there is nothing to release."""
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """The attribute, once per sub-environment asked for; all of them share one object."""
+        """Return the attribute once per chosen sub-environment; all of them share one object."""
         return [getattr(self, attr_name)] * len(self._chosen(indices))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
@@ -83,14 +83,14 @@ class MctfVecEnv(VecEnv):
         setattr(self, attr_name, value)
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
-        """Call a method of the batch, with one answer per sub-environment asked for; of masks each has its own."""
+        """Call a method of the batch and return its answer once per chosen sub-environment; each has its own mask."""
         if method_name == "action_masks":
             return list(self.action_masks()[self._chosen(indices)])
         answer = getattr(self.batch, method_name)(*args, **kwargs)
         return [answer] * len(self._chosen(indices))
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
-        """No sub-environment has a wrapper of its own."""
+        """Return False for each: no sub-environment has a wrapper of its own."""
         return [False] * len(self._chosen(indices))
 
     def _chosen(self, indices: Any) -> Sequence[int]:
