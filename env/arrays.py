@@ -88,7 +88,7 @@ class Games(NamedTuple):
     captures: Annotated[IntArray, 2]
     grabs: Annotated[IntArray, 2]
     tags: Annotated[IntArray, 2]
-    events: Annotated[IntArray, 2, 4]  # captures, grabs, tags made and boats gone out of bounds in this decision
+    events: Annotated[IntArray, 2, 4]  # captures, grabs, tags made and boats newly out of bounds in this decision
     time_s: Annotated[Array, ()]
     terminated: Annotated[BoolArray, ()]  # a team reached max_score
     truncated: Annotated[BoolArray, ()]  # time is up

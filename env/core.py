@@ -250,7 +250,7 @@ class BatchedMctf:
         return view_game(self.config, self.rules, self.games, game)
 
     def _checked(self, what: str, values: Any) -> Array:
-        """Return actions or commands (B, n, 2) as an array; refuse non-finite ones and those that overflow the motion."""
+        """Return actions or commands (B, n, 2) as an array; refuse non-finite ones and those that overflow motion."""
         shape = self._commands.shape
         try:
             array = numbers(values)

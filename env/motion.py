@@ -56,7 +56,7 @@ def penalise_hit(rules: Rules, games: Games, b: int, i: int) -> None:
 
 @lean_kernel
 def bounce_off(rules: Rules, games: Games, b: int, i: int) -> None:
-    """Put a boat that hit an obstacle back, turned round, stopped and without the flag. Its autopilot's memory stays."""
+    """Put a boat that hit an obstacle back, turned round, stopped and without flag. Its autopilot's memory stays."""
     state = games.state[b, i]
     penalise_hit(rules, games, b, i)
     before = games.previous_position[b, i]

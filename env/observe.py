@@ -100,7 +100,10 @@ def normalise(raw: Array, middle: Array, scale: Array, out: np.ndarray) -> None:
 
 @lean_kernel
 def observe_games(rules: Rules, games: Games, middle: Array, scale: Array, raw: Array, out: np.ndarray) -> None:
-    """Write normalised observations of every game into ``out`` (B, n, n_obs) float32; ``raw`` (k, n, n_obs) is scratch."""
+    """Write normalised observations of every game into ``out`` (B, n, n_obs) float32.
+
+    ``raw`` (k, n, n_obs) is scratch.
+    """
     n_games = games.state.shape[0]
     for first in range(0, n_games, raw.shape[0]):
         last = min(first + raw.shape[0], n_games)

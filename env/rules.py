@@ -1,6 +1,6 @@
-"""The rules once the boats have moved, in the order of the reference simulator.
+"""The rules applied after the boats have moved, in the order of the reference simulator.
 
-Every kernel works on the games from number ``first`` up to, not including, ``last``.
+Every kernel processes the games first..last-1.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def recharge(rules: Rules, games: Games, first: int, last: int) -> None:
 
 @lean_kernel
 def check_bounds(rules: Rules, games: Games, first: int, last: int) -> None:
-    """Mark boats on or beyond an edge; they are tagged (if the rules say so) and lose the flag."""
+    """Mark boats on or beyond an edge. They lose the flag and, if the rules say so, are tagged."""
     for b in range(first, last):
         for i in range(rules.n_boats):
             x, y = games.state[b, i, L.X], games.state[b, i, L.Y]
@@ -43,7 +43,7 @@ def check_bounds(rules: Rules, games: Games, first: int, last: int) -> None:
 
 @lean_kernel
 def check_grabs(rules: Rules, games: Games, first: int, last: int) -> None:
-    """Untagged boats on the far side within reach of a flag that is home take it, first boat first."""
+    """Let untagged boats on the far side take a flag that is home and within reach, first boat first."""
     for b in range(first, last):
         for i in range(rules.n_boats):
             team = rules.team[i]
@@ -61,7 +61,7 @@ def check_grabs(rules: Rules, games: Games, first: int, last: int) -> None:
 
 @lean_kernel
 def _first_in_reach(state: Array, on_side: BoolArray, is_tagged: BoolArray, i: int, first: int, reach_m: float) -> int:
-    """The first untagged opponent of boat ``i``, from ``first`` on, on the wrong side within reach, -1 for none."""
+    """Return the first untagged opponent of boat ``i``, from ``first`` on, on the wrong side within reach, or -1."""
     for j in range(first, first + state.shape[0] // 2):
         if not on_side[j] and not is_tagged[j] and is_within(state[j], state[i], reach_m):
             return j
@@ -70,9 +70,10 @@ def _first_in_reach(state: Array, on_side: BoolArray, is_tagged: BoolArray, i: i
 
 @lean_kernel
 def check_tags(rules: Rules, games: Games, first: int, last: int) -> None:
-    """Boats on their side, in bounds, untagged, able and recharged tag one opponent each, in boat order.
+    """Let boats tag one opponent each, in boat order.
 
-    A try that fails by chance costs the cool-down as well.
+    A boat can tag if it is on its side, in bounds, untagged, not disabled and recharged. An attempt that fails by
+    chance costs the cool-down as well.
     """
     for b in range(first, last):
         for i in range(rules.n_boats):
@@ -99,7 +100,7 @@ def check_tags(rules: Rules, games: Games, first: int, last: int) -> None:
 
 @lean_kernel
 def is_at_corner(rules: Rules, games: Games, b: int, i: int) -> bool:
-    """Whether boat ``i`` is within the corner radius of a corner of its own side."""
+    """Return whether boat ``i`` is within the corner radius of a corner of its own side."""
     corners = rules.corners[rules.team[i]]
     near = is_within(games.state[b, i], corners[0], rules.corner_radius)
     return near or is_within(games.state[b, i], corners[1], rules.corner_radius)
@@ -107,7 +108,7 @@ def is_at_corner(rules: Rules, games: Games, b: int, i: int) -> bool:
 
 @lean_kernel
 def check_captures(rules: Rules, games: Games, first: int, last: int) -> None:
-    """Carriers that reached their own side (or, by option, their own base or corners) score; the flag goes home."""
+    """Score for carriers that reached their own side (or, by option, own base or corners); the flag goes home."""
     for b in range(first, last):
         for i in range(rules.n_boats):
             if not games.has_flag[b, i]:
@@ -126,7 +127,7 @@ def check_captures(rules: Rules, games: Games, first: int, last: int) -> None:
 
 @lean_kernel
 def check_untags(rules: Rules, games: Games, first: int, last: int) -> None:
-    """Tagged boats within reach of their own flag's home, or in bounds at their corners, are free again."""
+    """Free tagged boats within reach of their own flag's home, or in bounds at their corners."""
     for b in range(first, last):
         for i in range(rules.n_boats):
             if games.is_tagged[b, i] and rules.untag_at_corner:
@@ -138,7 +139,7 @@ def check_untags(rules: Rules, games: Games, first: int, last: int) -> None:
 
 @lean_kernel
 def check_end(rules: Rules, games: Games, first: int, last: int) -> None:
-    """End a game when a team has the top score, or when time is up (to the reference's tolerance)."""
+    """End a game when a team has the top score or time is up (to the reference's tolerance)."""
     slack = 1e-8 + 1e-5 * rules.max_time_s
     for b in range(first, last):
         games.terminated[b] = max(games.captures[b, 0], games.captures[b, 1]) >= rules.max_score
@@ -165,18 +166,18 @@ def _new_in_game(state: Array, radius: Array, touching: BoolArray, new: IntArray
 
 @lean_kernel
 def check_collisions(rules: Rules, games: Games, first: int, last: int) -> None:
-    """Count the pairs of the games first..last-1 that came within touch in this step."""
+    """Count the pairs of the games first..last-1 that have come in touch since the last check."""
     for b in range(first, last):
         _new_in_game(games.state[b], rules.agent_radius, games.touching[b], games.new_collisions[b])
         for i in range(rules.n_boats):
             games.collisions[b, i] += games.new_collisions[b, i]
-            if rules.decision_steps == 1:  # every step was looked at
+            if rules.decision_steps == 1:  # every step has been checked
                 games.contacts[b, i] += games.new_collisions[b, i]
 
 
 @lean_kernel
 def look_for_contacts(rules: Rules, games: Games, first: int, last: int) -> None:
-    """Count, after one of several steps of a decision, the pairs that came within touch in it."""
+    """Count the pairs that come in touch in one of several steps of a decision."""
     if rules.decision_steps == 1:
         return
     for b in range(first, last):
@@ -187,7 +188,10 @@ def look_for_contacts(rules: Rules, games: Games, first: int, last: int) -> None
 
 @lean_kernel
 def reward_games(rules: Rules, games: Games, out: Array) -> None:
-    """Rewards of the last step into ``out`` (B, n): weighted own events minus the opponents', minus own collisions."""
+    """Write rewards of the last decision into ``out`` (B, n).
+
+    A reward is the weighted own events minus the opponents', minus the boat's own collisions.
+    """
     for b in range(out.shape[0]):
         blue = 0.0
         for kind in range(4):

@@ -1,4 +1,4 @@
-"""Where boats start: fixed places on a line before the own flag, random ones, or a partial state."""
+"""Start places of boats: fixed ones on a line before the own flag, random ones, or a partial state."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MAX_TRIES = 20_000
 
 
 def default_places(config: GameConfig, field: FieldGeometry) -> Array:
-    """Fixed start places (n, 2), m: evenly along the line halfway between the own flag and the dividing line."""
+    """Return fixed start places (n, 2), m: evenly along the line halfway between own flag and dividing line."""
     along = field.scrimmage[1] - field.scrimmage[0]
     places = np.zeros((config.n_boats, 2))
     for i in range(config.n_boats):
@@ -44,7 +44,7 @@ def default_places(config: GameConfig, field: FieldGeometry) -> Array:
 
 @kernel
 def place_is_free(rules: Rules, games: Games, b: int, i: int, x: float, y: float, placed: BoolArray) -> bool:
-    """Whether boat ``i`` may start at (x, y): clear of placed boats, flags that are home, obstacles and edges."""
+    """Return whether boat ``i`` may start at (x, y): clear of placed boats, flags at home, obstacles and edges."""
     radius = rules.agent_radius[i]
     if not (radius < x < rules.size[0] - radius and radius < y < rules.size[1] - radius):
         return False
@@ -63,7 +63,10 @@ def place_is_free(rules: Rules, games: Games, b: int, i: int, x: float, y: float
 
 @kernel
 def draw_place(rules: Rules, games: Games, b: int, i: int, side: int, placed: BoolArray) -> bool:
-    """Put boat ``i`` on a random free place, if any, on the side of team ``side`` or, with -1, anywhere."""
+    """Put boat ``i`` on a random free place; return False if there is none.
+
+    ``side`` is the team on whose side the place is; -1 allows both.
+    """
     radius = rules.agent_radius[i]
     for _ in range(MAX_TRIES):
         x = radius + next_uniform(games.rng, b) * (rules.size[0] - 2.0 * radius)
@@ -78,13 +81,13 @@ def draw_place(rules: Rules, games: Games, b: int, i: int, side: int, placed: Bo
 
 @kernel
 def heading_to_scrimmage(rules: Rules, x: float, y: float) -> float:
-    """Heading from (x, y) to the closest point of the dividing line, deg."""
+    """Return the heading from (x, y) to the closest point of the dividing line, deg."""
     px, py = closest_on_segment(rules.scrimmage, x, y)
     return heading_to(px - x, py - y)
 
 
 def clear_games(rules: Rules, games: Games, chosen: Any) -> None:
-    """Scores, flags, counters and clocks of games, a mask or a number, as at the start of a game."""
+    """Set scores, flags, counters and clocks of games (a mask or a number) as at the start of a game."""
     for name in Games._fields:
         if name != "rng":
             getattr(games, name)[chosen] = 0
@@ -99,7 +102,7 @@ def clear_games(rules: Rules, games: Games, chosen: Any) -> None:
 def _find_place(
     rules: Rules, games: Games, b: int, i: int, place: Array, random: bool, own_side: bool, placed: BoolArray
 ) -> bool:
-    """Put boat ``i`` on its fixed place when that is free, else on a random one; False when there is none."""
+    """Put boat ``i`` on its fixed place if that is free, otherwise on a random one; False if there is none."""
     team = rules.team[i]
     if games.has_flag[b, i]:
         return draw_place(rules, games, b, i, 1 - team, placed)
@@ -115,11 +118,19 @@ def _find_place(
 
 @kernel
 def start_game(rules: Rules, games: Games, b: int, places: Array, given: Array, random: bool, own_side: bool) -> bool:
-    """Place every boat of game ``b`` (already cleared, carriers already marked); False when one found no place.
+    """Place every boat of game ``b``; return False if one found no place.
 
-    A boat whose place of the fixed ``places`` (n, 2), m, is not free gets a random one on its own side. ``given``
-    (n, 4) is x m, y m, speed m/s and heading deg that the caller wants, NaN where it does not care. With ``random``
-    positions, speeds and headings are random, with ``own_side`` on the own side.
+    The game must be cleared and its carriers marked. A boat whose fixed place is not free gets a random one on its own
+    side.
+
+    Args:
+        rules: the rules.
+        games: the games.
+        b: number of the game.
+        places: (n, 2) fixed places, m.
+        given: (n, 4) x m, y m, speed m/s, heading deg as the caller wants them; NaN where it leaves them open.
+        random: draw positions, speeds and headings.
+        own_side: draw positions on the own side.
     """
     placed = np.zeros(rules.n_boats, np.bool_)
     for i in range(rules.n_boats):
@@ -145,7 +156,7 @@ def start_game(rules: Rules, games: Games, b: int, places: Array, given: Array, 
 
 @kernel
 def settle(rules: Rules, games: Games, b: int) -> None:
-    """After placing: sides, last positions, and the grabs, tags and untags that the places themselves cause."""
+    """Set sides, last positions, and the grabs, tags and untags that the start places themselves cause."""
     for i in range(rules.n_boats):
         x, y = games.state[b, i, L.X], games.state[b, i, L.Y]
         games.previous_position[b, i, 0], games.previous_position[b, i, 1] = x, y
@@ -204,14 +215,14 @@ PER_BOAT = {
     "agent_tagging_cooldown": 1,
     "agent_collisions": 1,
 }
-"""What may be given of boats, and how many numbers it is."""
+"""Per-boat keys of a partial state, and how many numbers each has."""
 
 PER_TEAM = ("captures", "tags", "grabs", "power_play_start")
 KEYS = (*PER_BOAT, "agent_pos_unit", *PER_TEAM, "power_play_boats")
 
 
 def start_from(config: GameConfig, rules: Rules, games: Games, b: int, places: Array, init: Mapping[str, Any]) -> None:
-    """Start game ``b`` from a partial state; what is not given is as after a plain reset.
+    """Start game ``b`` from a partial state; the rest is as after a plain reset.
 
     Args:
         config: the game's settings.
@@ -221,7 +232,7 @@ def start_from(config: GameConfig, rules: Rules, games: Games, b: int, places: A
         places: (n, 2) fixed start places, m.
         init: any of `KEYS`; per-boat values as a sequence in boat order or a dict by agent id, per-team values as a
             pair (blue, red) or a dict by team. ``power_play_start`` is the decision at which each team's power play
-            begins, ``power_play_boats`` the boat of each it disables. Units: m, m/s, deg, s.
+            begins; ``power_play_boats`` is the boat of each team that it disables. Units: m, m/s, deg, s.
 
     Raises:
         GameError: a key, id, shape or value that the rules do not allow.
@@ -265,7 +276,7 @@ def start_from(config: GameConfig, rules: Rules, games: Games, b: int, places: A
 
 
 def _rows(key: str, value: Any, names: Sequence[Any], width: int, number: Callable[..., int]) -> Array:
-    """One row of numbers per boat or team of ``names``, NaN for those a dict does not name: (n, width)."""
+    """Return one row of numbers per boat or team of ``names``, NaN where a dict has no entry: (n, width)."""
     rows = np.full((len(names), width), np.nan)
     if isinstance(value, Mapping):
         for name, entry in value.items():
@@ -287,7 +298,7 @@ def _boat_number(key: str, agent_id: Any, ids: Sequence[str]) -> int:
 
 
 def _team_number(key: str, team: Any, _: Sequence[int]) -> int:
-    """0 or 1, of any team whose ``int`` is that."""
+    """Return 0 or 1 for any team whose ``int`` is that."""
     try:
         number = int(team)
     except (TypeError, ValueError):
@@ -308,7 +319,7 @@ def _numbers(key: str, value: Any, width: int) -> Array:
 
 
 def _counts(key: str, value: Any) -> Array:
-    """Counts (2,) of blue and red, 0 where a dict names none."""
+    """Return counts (2,) of blue and red, 0 where a dict has no entry."""
     counts = np.nan_to_num(_rows(key, value, (0, 1), 1, _team_number)[:, 0])
     if (counts < 0).any():
         raise GameError(f"{key} is {value!r}; counts are >= 0")
@@ -316,7 +327,7 @@ def _counts(key: str, value: Any) -> Array:
 
 
 def _power_play_boats(config: GameConfig, value: Any) -> Array:
-    """The boats (2, 2) that the power plays of each team disable."""
+    """Return the boats (2, 2) that the power plays of each team disable."""
     try:
         boats = np.asarray(value, dtype=np.float64)
         boats = np.broadcast_to(boats.reshape(2, -1), (2, 2))
@@ -329,7 +340,7 @@ def _power_play_boats(config: GameConfig, value: Any) -> Array:
 
 
 def _check_carriers(config: GameConfig, rules: Rules, carries: np.ndarray, given: Array) -> None:
-    """At most one boat of a team carries a flag, and none on its own side."""
+    """Check that at most one boat of a team carries a flag, and none on its own side."""
     for team in (0, 1):
         if carries[rules.team == team].sum() > 1:
             raise GameError("agent_has_flag: at most one boat of a team can carry the opponents' flag")
@@ -339,7 +350,7 @@ def _check_carriers(config: GameConfig, rules: Rules, carries: np.ndarray, given
 
 
 def _check_places(config: GameConfig, rules: Rules, taken: np.ndarray, given: Array) -> None:
-    """Given places must lie inside the field, clear of obstacles and of flags that are home, no two on one point."""
+    """Check that given places are inside the field, clear of obstacles and of flags at home, and all different."""
     for i in np.flatnonzero(~np.isnan(given[:, 0])):
         place, radius = given[i, :2], config.agent_radius_m[i]
         here = f"{config.agent_ids[i]} at ({place[0]:g}, {place[1]:g})"

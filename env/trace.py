@@ -1,4 +1,4 @@
-"""Recorded games of the reference simulator: reading, checking and cutting the files."""
+"""Recorded games of the reference simulator: reading, checking and cutting of the files."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .pyquaticus_config import from_pyquaticus
 from .whole_file import Axes, check_finite, check_shapes, read_arrays, save_arrays
 
 OBSERVATION_EVERY = 5
-"""Observations are recorded at every so many decisions, where a trace does not say otherwise."""
+"""Decisions between recorded observations, unless the trace says otherwise."""
 
 _BOATS: Axes = ("T+1", "n")
 _TEAMS: Axes = ("T+1", 2)
@@ -44,13 +44,13 @@ LAYOUT: dict[str, Axes] = {
     "is_disabled": _BOATS,
     "contacts": _BOATS,
 }
-"""Per array its axes: T decisions, S of them observed, n boats, g and k numbers of the global state and of a view."""
+"""Axes of each array: T decisions, S of them observed, n boats, g numbers of the global state, k of an observation."""
 
 OF_2026 = ("is_disabled", "contacts")
-"""Of games of several steps a decision or with power plays; ``contacts`` may be told by ``sub_position``."""
+"""Arrays of games with several steps per decision or with power plays; `load_trace` can derive ``contacts``."""
 
 MOST_BOATS = 100
-"""Of a team."""
+"""Largest team."""
 META_KEYS = ("config", "team_size", "agent_ids", "dt", "obs_keys", "global_state_keys", "agent_radius")
 
 _REMEDY = "Record or copy it again."
@@ -62,9 +62,9 @@ class Trace:
 
     Attributes:
         path: the file.
-        meta: its settings, Pyquaticus' own names.
+        meta: its settings, under Pyquaticus' own names.
         config: the same game as a `GameConfig`.
-        arrays: those of `LAYOUT`, m, m/s, deg and s; index t is before, t+1 after action t.
+        arrays: those of `LAYOUT`, in m, m/s, deg and s; index t is before, t+1 after action t.
     """
 
     path: Path
@@ -74,7 +74,7 @@ class Trace:
 
     @property
     def steps(self) -> int:
-        """Recorded decisions T."""
+        """Number of recorded decisions T."""
         return len(self.arrays["action"])
 
     @property
@@ -83,20 +83,20 @@ class Trace:
         return int(self.meta.get("obs_every", OBSERVATION_EVERY))
 
     def cut(self, steps: int) -> Trace:
-        """The first ``steps`` decisions."""
+        """Return the first ``steps`` decisions."""
         if not 1 <= steps <= self.steps:
             raise TraceError(f"cannot cut {self.path.name} to {steps} steps; give 1..{self.steps}")
         ends = {"T": steps, "T+1": steps + 1, "S": steps // self.observed_every + 1}
         return replace(self, arrays={name: a[: ends[str(LAYOUT[name][0])]] for name, a in self.arrays.items()})
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the trace; returns the path."""
+        """Write the trace and return the path."""
         save_arrays(Path(path), {"meta": np.array(json.dumps(self.meta)), **self.arrays})
         return Path(path)
 
 
 def load_trace(path: str | os.PathLike[str]) -> Trace:
-    """Read a recorded game and check that it is whole.
+    """Read a recorded game and check that it is complete.
 
     Raises:
         TraceError: the file is missing, cut short, not a trace, lacks an array or fits no game.
@@ -114,7 +114,7 @@ def load_trace(path: str | os.PathLike[str]) -> Trace:
         raise
     except ConfigError as error:
         raise TraceError(f"{source}: its settings fit no game: {error}") from error
-    except (TypeError, ValueError, LookupError, AttributeError, ArithmeticError) as error:  # whatever the file held
+    except (TypeError, ValueError, LookupError, AttributeError, ArithmeticError) as error:  # whatever the file contains
         raise TraceError(f"{source} is no trace ({type(error).__name__}: {error}). {_REMEDY}") from error
     return trace
 
@@ -141,7 +141,10 @@ def _read_meta(source: Path, arrays: dict[str, np.ndarray]) -> dict[str, Any]:
 
 
 def _count_contacts(after: np.ndarray, config: GameConfig) -> np.ndarray:
-    """Entries into the sum of radii so far of each boat, (T+1, n), from places (T, S, n, 2) m after every step."""
+    """Count the contacts of each boat so far, (T+1, n), from places (T, S, n, 2), m, after every step.
+
+    A contact is an entry into the sum of two boats' radii.
+    """
     decisions, steps, n = after.shape[:3]
     radius = np.array(config.agent_radius_m)
     gap_m = np.linalg.norm(after[..., :, None, :] - after[..., None, :, :], axis=-1).reshape(-1, n, n)
@@ -152,7 +155,7 @@ def _count_contacts(after: np.ndarray, config: GameConfig) -> np.ndarray:
 
 
 def _check(trace: Trace) -> None:
-    """Check that arrays are there, fit together and hold usable numbers."""
+    """Check that arrays are present, fit together and hold usable numbers."""
     arrays, source = trace.arrays, trace.path
     missing = [name for name in LAYOUT if name not in arrays and name not in OF_2026]
     if missing:

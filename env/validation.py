@@ -1,4 +1,4 @@
-"""Checks of settings. Each returns the checked value or raises one `ConfigError` that names the remedy."""
+"""Checks of settings. Each returns the checked value or raises a `ConfigError` that names the remedy."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from steerclear.shield.exceptions import ConfigError
 def check_real(
     name: str, value: Any, low: float | None = None, above: float | None = None, high: float | None = None
 ) -> float:
-    """A finite number, ``>= low`` or ``> above`` and ``<= high`` where given."""
+    """Check that a value is a finite number, ``>= low``, ``> above`` and ``<= high`` where given."""
     if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise ConfigError(f"{name} is {value!r}; give a number")
     number = float(value)
@@ -29,7 +29,7 @@ def check_real(
 
 
 def check_count(name: str, value: Any, low: int, high: int | None = None) -> int:
-    """A whole number ``>= low`` and ``<= high`` where given."""
+    """Check that a value is a whole number, ``>= low`` and, where given, ``<= high``."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < low:
         raise ConfigError(f"{name} is {value!r}; give a whole number >= {low}")
     if high is not None and value > high:
@@ -38,13 +38,13 @@ def check_count(name: str, value: Any, low: int, high: int | None = None) -> int
 
 
 def check_choice(name: str, value: Any, choices: Sequence[Any]) -> None:
-    """One of ``choices``."""
+    """Check that a value is one of ``choices``."""
     if not any(value is choice or (isinstance(value, str) and value == choice) for choice in choices):
         raise ConfigError(f"{name} is {value!r}; choose one of {', '.join(repr(c) for c in choices)}")
 
 
 def check_point(name: str, value: Any) -> tuple[float, float]:
-    """An (x, y) pair of finite numbers."""
+    """Check that a value is an (x, y) pair of finite numbers."""
     if isinstance(value, str) or not isinstance(value, Iterable):
         raise ConfigError(f"{name} is {value!r}; give a pair (x, y)")
     pair = tuple(value)
@@ -54,7 +54,7 @@ def check_point(name: str, value: Any) -> tuple[float, float]:
 
 
 def check_segment(name: str, value: Any) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Two different points."""
+    """Check that a value is two different points."""
     points = list(value) if isinstance(value, Iterable) and not isinstance(value, str) else []
     ends = tuple(check_point(name, point) for point in points) if len(points) == 2 else ()
     if len(set(ends)) != 2:
@@ -63,7 +63,7 @@ def check_segment(name: str, value: Any) -> tuple[tuple[float, float], tuple[flo
 
 
 def per_boat(name: str, value: Any, n_boats: int, kinds: tuple[type, ...]) -> tuple[Any, ...]:
-    """One value per boat: a single value is repeated, a sequence must have the right length."""
+    """Return one value per boat: a single value is repeated, a sequence must have the right length."""
     if isinstance(value, kinds):
         return (value,) * n_boats
     if isinstance(value, (list, tuple, np.ndarray)):
@@ -75,7 +75,10 @@ def per_boat(name: str, value: Any, n_boats: int, kinds: tuple[type, ...]) -> tu
 
 
 def check_obstacles(value: Any) -> dict[str, tuple[Any, ...]]:
-    """Circles (radius, (x, y)) and polygons of at least three different corners (x, y), m, by kind; None has none."""
+    """Check obstacles and return them by kind; None means none.
+
+    Circles are (radius, (x, y)), polygons at least three different corners (x, y); metres.
+    """
     if value is None:
         value = {}
     if not isinstance(value, Mapping) or set(value) - {"circle", "polygon"}:

@@ -67,7 +67,7 @@ _COPIED = tuple(entry.name for entry in fields(GameView) if entry.name not in _F
 
 
 def view_game(config: GameConfig, rules: Rules, games: Games, b: int) -> GameView:
-    """A view of game ``b``."""
+    """Return a view of game ``b``."""
     return GameView(
         config=config,
         params=rules.params,
@@ -81,7 +81,7 @@ def view_game(config: GameConfig, rules: Rules, games: Games, b: int) -> GameVie
 
 
 def restore_game(rules: Rules, games: Games, b: int, view: GameView) -> None:
-    """Make game ``b`` stand as a view says; what a view does not hold (random numbers, who touches whom) stays."""
+    """Set game ``b`` to the state in a view. What a view lacks (random numbers, touching pairs) is not changed."""
     for name in _COPIED:
         target, given = getattr(games, name)[b], np.asarray(getattr(view, name))
         if given.shape != target.shape:

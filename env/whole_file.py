@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all, and files of arrays that may be missing, cut, damaged or something else."""
+"""Files that are written completely or not at all, and files of arrays that may be missing, cut or damaged."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ import numpy as np
 from steerclear.shield.exceptions import SteerclearError, TraceError
 
 MOST_BYTES = 200 * 2**20
-"""Of all arrays of a file together, unpacked; ten hours of three against three are a tenth of it."""
+"""Limit for all arrays of a file together, unpacked. Ten hours of three against three boats are a tenth of it."""
 
 Axes = tuple[str | int, ...]
-"""Of an array: lengths, or the names of lengths."""
+"""Axes of an array: lengths, or names of lengths."""
 
 _UNREADABLE = (
     OSError,
@@ -37,7 +37,7 @@ _UNREADABLE = (
     zipfile.BadZipFile,
     zlib.error,
 )
-"""What numpy raises on files that are cut, damaged, or hold something else."""
+"""Exceptions of numpy for files that are cut, damaged, or hold something else."""
 
 
 @contextmanager
@@ -45,14 +45,14 @@ def whole_file(target: Path, error: type[SteerclearError]) -> Iterator[Path]:
     """Write to a file beside the target and move it there once it is complete.
 
     Args:
-        target: File to write; its folder is created, an older file stays until the new one is complete.
+        target: File to write; its folder is created. An older file stays until the new one is complete.
         error: Raised when the file cannot be written.
 
     Yields:
         The file to write to, with the target's ending.
 
     Raises:
-        SteerclearError: Of the class given.
+        SteerclearError: Of the class ``error``.
     """
     part = target.with_name(f".{target.stem}.{os.getpid()}.part{target.suffix}")
     try:
@@ -67,16 +67,21 @@ def whole_file(target: Path, error: type[SteerclearError]) -> Iterator[Path]:
 
 
 def save_arrays(target: Path, arrays: Mapping[str, np.ndarray]) -> None:
-    """Write an ``.npz`` file, whole or not at all."""
+    """Write an ``.npz`` file, completely or not at all."""
     with whole_file(target, TraceError) as part, part.open("wb") as stream:
         np.savez_compressed(stream, allow_pickle=False, **arrays)
 
 
 def read_arrays(path: str | os.PathLike[str], what: str, remedy: str) -> dict[str, np.ndarray]:
-    """Read all arrays of an ``.npz`` file, ``what`` it should be; nothing that is not plain data is ever loaded.
+    """Read all arrays of an ``.npz`` file; only plain data is ever loaded.
+
+    Args:
+        path: the file.
+        what: what the file should be, for error messages.
+        remedy: the end of error messages.
 
     Raises:
-        TraceError: the file is missing, cut or no such file; the message ends with the remedy.
+        TraceError: the file is missing, cut or of another kind.
     """
     source = Path(path)
     if source.is_dir():
@@ -94,7 +99,7 @@ def read_arrays(path: str | os.PathLike[str], what: str, remedy: str) -> dict[st
 
 
 def _check_sizes(archive: zipfile.ZipFile) -> None:
-    """Refuse arrays that say they are larger than their file, or too large together, before room is made for them."""
+    """Refuse arrays that claim to be larger than their file, or are too large together, before memory is allocated."""
     total = sum(entry.file_size for entry in archive.infolist())
     if total > MOST_BYTES:
         raise ValueError(f"it unpacks to {total / 2**20:.0f} MiB, at most {MOST_BYTES / 2**20:.0f} are read")
@@ -110,7 +115,7 @@ def _check_sizes(archive: zipfile.ZipFile) -> None:
 def check_shapes(
     arrays: Mapping[str, np.ndarray], layout: Mapping[str, Axes], sizes: Mapping[str, int], whose: str, remedy: str
 ) -> None:
-    """Raise a `TraceError`, from ``whose`` to the remedy, where arrays have not the axes of a layout of such sizes."""
+    """Raise a `TraceError`, from ``whose`` to the remedy, if arrays lack the axes of a layout with these sizes."""
     for name, axes in layout.items():
         want = tuple(axis if isinstance(axis, int) else sizes[axis] for axis in axes)
         if arrays[name].shape != want:
@@ -118,7 +123,7 @@ def check_shapes(
 
 
 def check_finite(arrays: Mapping[str, Any], names: tuple[str, ...], whose: str, remedy: str) -> None:
-    """Raise a `TraceError`, from ``whose`` to the remedy, where an array is not finite."""
+    """Raise a `TraceError`, from ``whose`` to the remedy, if an array is not finite."""
     for name in names:
         if not np.isfinite(arrays[name]).all():
             raise TraceError(f"{whose}{name} holds NaN or infinity. {remedy}")

@@ -1,4 +1,4 @@
-"""Boats: hull and autopilot models, their limits, and the autopilot's inverse."""
+"""Platforms: models of hull and autopilot, their limits, and the autopilot's inverse."""
 
 from . import layout
 from .platform import Gains, Platform

@@ -1,9 +1,9 @@
-"""The boat in actuator terms, and the autopilot's inverse.
+"""The boat in terms of turn and speed, and the autopilot's inverse.
 
-A heading controller with a derivative term answers a *change* of command at once and a held error slowly, so
-the same boat turns several times harder when its commands are chosen through the controller. `actuate` moves
-a boat by a turn (deg in this step) and a speed command; `command_for_turn` gives the heading error that makes
-the autopilot produce exactly that turn now.
+A heading controller with a derivative term answers a *change* of command at once and a constant error slowly. A boat
+therefore turns several times harder if its commands account for the controller. `actuate` moves a boat by a turn (deg
+in this step) and a speed command. `command_for_turn` returns the heading error that makes the autopilot produce exactly
+that turn in this step.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ from .step import error_for_turn, moves_in, turn_at_rudder
 from .usv import actuate_usv, clamp, next_thrust, turn_of_rudder
 
 FARTHEST_DEG = 179.0
-"""Largest heading error commanded, deg: of a half turn nobody can tell the side once it is an absolute heading."""
+"""Largest commanded heading error. A half turn as an absolute heading would not tell the side to turn to."""
 
 
 @lean_kernel
 def held_rudder(params: Array) -> float:
-    """Rudder, percent, that the heading controller can hold: without its derivative, at the largest error there is."""
+    """Return the rudder, percent, that the heading controller can hold: without derivative, at the largest error."""
     return min(min(params[L.MAX_RUDDER], 100.0), params[L.HEADING_KP] * FARTHEST_DEG)
 
 
 @lean_kernel
 def largest_turn(params: Array, state: Array, dt_s: float) -> float:
-    """Largest turn, deg, that step after step can make with the present thrust (or turn-rate limit)."""
+    """Return the largest turn, deg, that each of many steps can make with the present thrust (or turn-rate limit)."""
     if params[L.KIND] == L.KIND_USV:
         return abs(turn_of_rudder(params, state[L.THRUST], held_rudder(params), dt_s))
     if params[L.KIND] == L.KIND_SINGLE_INTEGRATOR:
@@ -53,7 +53,7 @@ def largest_turn(params: Array, state: Array, dt_s: float) -> float:
 
 @lean_kernel
 def thrust_after(params: Array, state: Array, speed_mps: float, dt_s: float) -> float:
-    """Thrust, percent, that this step will have under a speed command."""
+    """Return the thrust, percent, of this step under a speed command."""
     thrust, _, _ = next_thrust(
         params, state[L.SPEED], state[L.THRUST], state[L.SPEED_ERROR], state[L.SPEED_INTEGRAL], speed_mps, dt_s
     )
@@ -62,7 +62,7 @@ def thrust_after(params: Array, state: Array, speed_mps: float, dt_s: float) -> 
 
 @lean_kernel
 def full_turn(params: Array, state: Array, speed_mps: float, dt_s: float) -> float:
-    """Largest turn, deg, that this step and any after it can make under a speed command."""
+    """Return the largest turn, deg, that this step and any later one can make under a speed command."""
     moves = moves_in(params, dt_s)
     if moves > 1 and params[L.KIND] == L.KIND_USV:
         return turn_at_rudder(params, state, speed_mps, held_rudder(params), dt_s / moves, moves)
@@ -76,7 +76,7 @@ def full_turn(params: Array, state: Array, speed_mps: float, dt_s: float) -> flo
 
 @lean_kernel
 def actuate(params: Array, state: Array, speed_mps: float, turn_deg: float, dt_s: float) -> None:
-    """Advance ``state`` one step, turning as nearly by ``turn_deg`` as a rudder that can be held allows."""
+    """Advance ``state`` by one step, turning by ``turn_deg`` as nearly as a rudder that can be held allows."""
     kind = params[L.KIND]
     if kind == L.KIND_USV:
         full = turn_of_rudder(params, thrust_after(params, state, speed_mps, dt_s), 100.0, dt_s)
@@ -95,12 +95,12 @@ def actuate(params: Array, state: Array, speed_mps: float, turn_deg: float, dt_s
 
 @lean_kernel
 def command_for_turn(params: Array, state: Array, speed_mps: float, turn_deg: float, dt_s: float) -> float:
-    """Heading error, deg, that makes the autopilot turn the boat by ``turn_deg`` in this step.
+    """Return the heading error, deg, that makes the autopilot turn the boat by ``turn_deg`` in this step.
 
-    For a thrust boat this solves kp e + kd (e - e0)/dt + clamp(I + ki e dt) = rudder for e, where e0 and I are
-    the controller's memory (derivative 0 when it has none); an error held for several moves is found by trial. Without
-    thrust there is no rudder to command and the error returned is 0. An answer beyond +-`FARTHEST_DEG` is cut there:
-    the turn is then the nearest one possible.
+    For a thrust boat this solves kp e + kd (e - e0)/dt + clamp(I + ki e dt) = rudder for e. Here e0 and I are the
+    controller's memory (derivative 0 if it has none). An error held for several substeps is found by bisection. Without
+    thrust the rudder has no effect and the error returned is 0. Errors are limited to +-`FARTHEST_DEG`; the turn is
+    then the nearest possible one.
     """
     if params[L.KIND] == L.KIND_RATE:
         rate = state[L.TURN_RATE]
@@ -122,7 +122,7 @@ def command_for_turn(params: Array, state: Array, speed_mps: float, turn_deg: fl
 
 @lean_kernel
 def _error_for_rudder(params: Array, state: Array, rudder: float, dt_s: float) -> float:
-    """Invert the heading controller, trying the integral free first, then clamped at its nearer end."""
+    """Invert the heading controller: first with a free integral, then with the integral clamped at the nearer end."""
     last = state[L.HEADING_ERROR]
     gain = params[L.HEADING_KP]
     offset = 0.0

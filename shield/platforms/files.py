@@ -1,4 +1,4 @@
-"""Platform files: one boat behind its autopilot as a YAML, with units, and with what a fit measured of it."""
+"""Platform files: a boat behind its autopilot as YAML with units, and with what a fit measured."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from .schema import ENTRIES, GAINS, MEASURED, UNITS_TAKEN_FOR_OTHERS
 SUFFIXES = (".yaml", ".yml")
 LARGEST_BYTES = 64 << 10
 FASTEST_MPS = 40.0
-"""Boats are not faster, m/s: a number beyond it is in another unit."""
+"""Fastest boat; a larger number is in another unit."""
 
 
 @dataclass(frozen=True)
 class PlatformFile:
-    """A platform and what was measured of it.
+    """A platform and its measurements.
 
     Attributes:
         platform: the boat.
-        measured: entries of `schema.MEASURED` that the file holds; empty: nobody fitted it.
+        measured: entries of `schema.MEASURED` in the file; empty if no fit was made.
     """
 
     platform: Platform
@@ -34,17 +34,17 @@ class PlatformFile:
 
     @property
     def delay_s(self) -> float | None:
-        """From command to effect, s; None: not measured."""
+        """Time from command to effect, s; None if not measured."""
         return self.measured.get("delay_s")
 
     def error_m(self, ahead_s: float) -> float:
-        """Bound on 99 of 100 errors of places foretold so far ahead, m; 0 where nothing was measured."""
+        """Return a bound on 99 % of the position errors of predictions so far ahead, m; 0 if not measured."""
         growth = self.measured.get("error_growth_mps", 0.0)
         return self.measured.get("position_error_m", 0.0) + growth * max(0.0, ahead_s - 1.0)
 
 
 def is_path(name: str) -> bool:
-    """Whether a platform is named by its file."""
+    """Return whether a platform's name is that of a file."""
     return name.endswith(SUFFIXES)
 
 
@@ -52,7 +52,7 @@ def load_platform(path: str | Path) -> PlatformFile:
     """Read a platform file.
 
     Raises:
-        PlatformError: it cannot be read, or it is no boat; one line that names the file, the entry and the remedy.
+        PlatformError: it cannot be read or is no boat; one line that names the file, the entry and the remedy.
     """
     name = os.fspath(path)
     try:
@@ -80,7 +80,7 @@ def _load(name: str, _mtime_ns: int, _size: int) -> PlatformFile:
 
 
 def parse_platform(text: str) -> PlatformFile:
-    """The platform of a file's text.
+    """Return the platform of a file's text.
 
     Raises:
         PlatformError: it is no boat; one line.
@@ -97,7 +97,7 @@ def parse_platform(text: str) -> PlatformFile:
 
 
 def platform_file_of(given: dict[str, Any]) -> PlatformFile:
-    """The platform of settings as a file has them.
+    """Return the platform of a file's settings.
 
     Raises:
         PlatformError: an entry is unknown, missing, of another unit or not a number, or the boat cannot be steered.
@@ -158,7 +158,7 @@ def _measured(given: Any) -> dict[str, float]:
 
 
 def _refuse_key(key: str, known: Mapping[str, Any]) -> NoReturn:
-    """Say what to write instead of a key: in which unit, or which of the known ones."""
+    """Refuse an unknown entry; name its unit's conversion, or the entries that exist."""
     near = difflib.get_close_matches(key, known, n=1, cutoff=0.5)
     wrong = UNITS_TAKEN_FOR_OTHERS.get(key.rpartition("_")[2].lower())
     if wrong is not None:
@@ -169,7 +169,7 @@ def _refuse_key(key: str, known: Mapping[str, Any]) -> NoReturn:
 
 
 def settings_of(platform: Platform) -> dict[str, Any]:
-    """What a file says of a platform: the entries of its kind that are not as they are when left out."""
+    """Return a platform's settings for a file: the entries of its kind that differ from their defaults."""
     defaults = {entry.name: entry.default for entry in fields(Platform)}
     found: dict[str, Any] = {}
     for key, entry in ENTRIES.items():
@@ -184,7 +184,7 @@ def settings_of(platform: Platform) -> dict[str, Any]:
 
 
 def to_text(file: PlatformFile, head: str = "") -> str:
-    """The text of a platform file, with its unit and a word on each entry; reading it gives the same platform."""
+    """Return the text of a platform file, with unit and explanation of each entry; it reads back to the same."""
     lines = [f"# {line}" for line in head.splitlines()]
     lines += [f"name: {_text(file.platform.name)}", f"kind: {file.platform.kind}"]
     rows = [(key, _text(value), ENTRIES[key]) for key, value in settings_of(file.platform).items()]

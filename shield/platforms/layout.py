@@ -1,8 +1,8 @@
 """Column layouts of the arrays that compiled code reads.
 
-A boat's full state (hull and autopilot memory) is one row of ``N_STATE`` float64 values, a platform's
-parameters one row of ``N_PARAM``. Both are plain arrays so that one compiled step serves a single game,
-thousands of games and the shield's predictions alike.
+A boat's full state (hull and autopilot memory) is one row of ``N_STATE`` float64 values. A platform's parameters are
+one row of ``N_PARAM``. Plain arrays allow one compiled step to serve a single game, thousands of games and the shield's
+predictions.
 """
 
 from __future__ import annotations
@@ -13,19 +13,19 @@ X = 0
 Y = 1
 """Position north, m."""
 HEADING = 2
-"""Heading, deg, clockwise from north (+y), kept in [-180, 180]."""
+"""Heading, deg, clockwise from north (+y), in [-180, 180]."""
 SPEED = 3
-"""Speed the simulator stores, m/s."""
+"""Speed that the simulator stores, m/s."""
 THRUST = 4
 """Thrust, percent."""
 RUDDER = 5
 """Rudder, percent, positive turns clockwise."""
 SPEED_ERROR = 6
-"""Last error seen by the speed controller, m/s; NaN before its first call."""
+"""Last error of the speed controller, m/s; NaN before its first call."""
 SPEED_INTEGRAL = 7
 """Integral memory of the speed controller."""
 HEADING_ERROR = 8
-"""Last error seen by the heading controller, deg; NaN before its first call."""
+"""Last error of the heading controller, deg; NaN before its first call."""
 HEADING_INTEGRAL = 9
 """Integral memory of the heading controller."""
 TURN_RATE = 10
@@ -60,7 +60,7 @@ MAP_CAPACITY = 8
 MAP_SPEED = MAP_THRUST + MAP_CAPACITY
 N_PARAM = MAP_SPEED + MAP_CAPACITY
 MOVE_S = N_PARAM
-"""Column of rows that have one more: length of a move, s, of which a step under one command has several, see `step`."""
+"""Extra column of rows with N_PARAM + 1 entries: length of a substep, s, of a step with several, see `step`."""
 
 # --- values of KIND --------------------------------------------------------------------------------
 KIND_USV = 0
@@ -68,11 +68,11 @@ KIND_SINGLE_INTEGRATOR = 1
 KIND_DOUBLE_INTEGRATOR = 2
 KIND_RATE = 3
 
-# --- columns that boats of `KIND_RATE` use for values of their own ----------------------------------
+# --- columns that boats of `KIND_RATE` use for other values ------------------------------------------
 TURN_AT_REST = MAX_RUDDER
-"""Turn rate without way, deg/s."""
+"""Turn rate at rest, deg/s."""
 TURN_PER_SPEED = TURN_GAIN
-"""Turn rate gained with speed, deg/s per m/s; below 0: lost."""
+"""Turn rate gained with speed, deg/s per m/s; negative: lost."""
 SPEED_LAG = SPEED_KD
 """Lag of the speed, s."""
 TURN_LAG = HEADING_KD

@@ -1,4 +1,4 @@
-"""What a platform can do, found by running its own model: how fast it gains speed and how long a turn takes."""
+"""Limits of a platform, measured by simulating its own model: how fast it gains speed, how long a turn takes."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from .usv import fresh_state
 LONGEST_S = 60.0
 
 EVERY_S = 0.5
-"""Time between the moments of a stop that are tried, s."""
+"""Time between the tested moments of a stop."""
 
 FULL_THRUST = 0.9
-"""Share of its full thrust from which a boat can do what the value tables say: they are for full thrust."""
+"""Share of full thrust from which the value tables apply to a boat; they are solved for full thrust."""
 
 ENOUGH_THRUST = 0.85
-"""Share of its thrust at top speed from which a boat gets away from pursuers about as well as with all of it."""
+"""Share of the thrust at top speed from which a boat escapes pursuers about as well as with all of it."""
 
 
 @dataclass(frozen=True)
@@ -32,14 +32,14 @@ class Limits:
     """Measured limits of a platform behind its autopilot."""
 
     top_speed_mps: float  # top speed, m/s
-    acceleration_mps2: float  # highest acceleration, mean over any 0.2 s, from rest or out of a hard turn, m/s^2
+    acceleration_mps2: float  # highest acceleration, mean over any 0.2 s, from rest or after a hard turn, m/s^2
     turn_rate_dps: float  # highest turn rate in a hard turn begun at top speed, deg/s (thrust may rise in it)
-    # time of a 180 deg turn at the rudder the autopilot can hold and full speed command, begun at top speed, s
+    # time of a 180 deg turn begun at top speed, at full speed command and the rudder that the autopilot can hold, s
     half_turn_s: float
     turn_loss: float  # share of top speed lost in a long turn at full rudder and full speed command
     turn_deceleration_mps2: float  # mean rate at which that speed is lost, over the first half of the loss, m/s^2
     thrust: float  # thrust at top speed, percent; 0 without a thrust model
-    # longest time under a full speed command until 90 % of that is there, from rest or out of a stop, s
+    # longest time under a full speed command until 90 % of that thrust is reached, from rest or out of a stop, s
     thrust_s: float
 
     @property
@@ -50,7 +50,7 @@ class Limits:
 
 @lru_cache(maxsize=64)
 def limits_of(platform: Platform, dt_s: float = 0.1) -> Limits:
-    """Limits of a platform, by simulation with step ``dt_s``, s."""
+    """Return the limits of a platform, by simulation with step ``dt_s``, s."""
     speeds = np.array([float(state[L.SPEED]) for state in _hard_turn(platform, dt_s)])
     return Limits(
         top_speed_mps=platform.max_speed_mps,
@@ -65,9 +65,10 @@ def limits_of(platform: Platform, dt_s: float = 0.1) -> Limits:
 
 
 def _hard_turn(platform: Platform, dt_s: float, any_rudder: bool = True) -> Iterator[Array]:
-    """States of a boat, step after step, in a turn of `LONGEST_S` begun at top speed, the first and under full thrust.
+    """Yield a boat's states in a turn of `LONGEST_S` begun at top speed; the first is at full thrust.
 
-    With ``any_rudder`` it has all of its rudder to hold: what others are granted hangs on no autopilot.
+    With ``any_rudder`` the boat can hold its full rudder: what opponents are assumed able to do must not depend on
+    their autopilot.
     """
     params, state = cruise(platform, dt_s)
     if any_rudder:
@@ -80,13 +81,13 @@ def _hard_turn(platform: Platform, dt_s: float, any_rudder: bool = True) -> Iter
 
 
 def _acceleration(platform: Platform, dt_s: float) -> float:
-    """The larger of a start from rest and a rudder let go after a long hard turn, which gives its speed back."""
+    """Return the larger acceleration of two: from rest, and after a long hard turn, when the lost speed returns."""
     *_, turning = _hard_turn(platform, dt_s)
     return max(_gain(platform, start, dt_s) for start in (fresh_state(0.0, 0.0, 0.0), turning))
 
 
 def _gain(platform: Platform, state: Array, dt_s: float) -> float:
-    """Highest mean acceleration over any 0.2 s of a straight run at full speed command, m/s^2."""
+    """Return the highest mean acceleration over any 0.2 s of a straight run at full speed command, m/s^2."""
     params = platform.pack()
     speeds = [float(state[L.SPEED])]
     window = max(1, round(0.2 / dt_s))
@@ -99,7 +100,7 @@ def _gain(platform: Platform, state: Array, dt_s: float) -> float:
 
 
 def cruise(platform: Platform, dt_s: float = 0.1) -> tuple[Array, Array]:
-    """Parameters and state of the boat once it has settled at top speed, heading north from the origin."""
+    """Return parameters and state of a boat settled at top speed, heading north from the origin."""
     params, state = platform.pack(), fresh_state(0.0, 0.0, 0.0)
     for _ in range(int(LONGEST_S / dt_s)):
         actuate(params, state, platform.max_speed_mps, 0.0, dt_s)
@@ -108,14 +109,17 @@ def cruise(platform: Platform, dt_s: float = 0.1) -> tuple[Array, Array]:
 
 
 def _turn_rate(platform: Platform, dt_s: float) -> float:
-    """Highest turn rate, deg/s: the speed controller answers the speed lost in a turn with thrust, and so with turn."""
+    """Return the highest turn rate, deg/s.
+
+    In a turn the speed controller adds thrust for the lost speed, which also makes the boat turn faster.
+    """
     if platform.kind == "rate":
         return max(platform.max_turn_rate_at(0.0), platform.max_turn_rate_at(platform.max_speed_mps))
     return round(max(_turns(platform, dt_s, True)) / dt_s, 9)
 
 
 def _turns(platform: Platform, dt_s: float, any_rudder: bool) -> Iterator[float]:
-    """Turns, deg, of the steps of a hard turn."""
+    """Yield the turns, deg, of the steps of a hard turn."""
     headings = (float(state[L.HEADING]) for state in _hard_turn(platform, dt_s, any_rudder))
     return ((after - before) % 360.0 for before, after in pairwise(headings))
 
@@ -127,7 +131,7 @@ def _deceleration(speeds: Array, dt_s: float) -> float:
 
 
 def _half_turn(platform: Platform, dt_s: float) -> float:
-    """Time of a turn of 180 deg, s."""
+    """Return the time of a turn of 180 deg, s."""
     turned, step = 0.0, 0
     for turn in _turns(platform, dt_s, False):
         turned, step = turned + turn, step + 1
@@ -137,7 +141,7 @@ def _half_turn(platform: Platform, dt_s: float) -> float:
 
 
 def _thrust(platform: Platform, dt_s: float) -> float:
-    """The longest of the times it takes out of a stop begun at top speed, let go at any moment, rest being the last."""
+    """Return the longest time to regain thrust out of a stop begun at top speed and ended at any moment up to rest."""
     if platform.kind != "usv":
         return 0.0
     params, slowing = cruise(platform, dt_s)
@@ -153,7 +157,7 @@ def _thrust(platform: Platform, dt_s: float) -> float:
 
 
 def _until_thrust(platform: Platform, state: Array, enough: float, dt_s: float) -> float:
-    """Time under a full speed command until so much thrust is there, s."""
+    """Return the time under a full speed command until the thrust reaches ``enough``, s."""
     params, step = platform.pack(), 0
     while state[L.THRUST] < enough and step * dt_s < LONGEST_S:
         actuate(params, state, platform.max_speed_mps, 0.0, dt_s)

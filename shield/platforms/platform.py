@@ -27,12 +27,12 @@ USV, RATE, BOATS, LIMITED = ALL[:1], ALL[1:2], ALL[:2], ALL[1:3]
 
 @dataclass(frozen=True)
 class Entry:
-    """One entry of a platform, and what a platform file says of it."""
+    """An entry of a platform, and its explanation in platform files."""
 
     unit: str  # of its value; empty: none
     words: str  # what it is
-    kinds: tuple[str, ...] = ALL  # of boats it is for
-    column: int = -1  # where it begins in the parameter row
+    kinds: tuple[str, ...] = ALL  # kinds of boats that have it
+    column: int = -1  # first column in the parameter row
 
 
 ENTRIES: dict[str, Entry] = {
@@ -66,7 +66,7 @@ ENTRIES: dict[str, Entry] = {
     "speed_gain": Entry("percent per output", "of speed_pid, added to the thrust in each step", USV, L.SPEED_GAIN),
     "speed_pid": Entry("", "speed controller: output per m/s", USV, L.SPEED_KP),
 }
-"""Entries of a boat besides its name and kind, in the order files have them."""
+"""Entries of a boat besides its name and kind, in the order of files."""
 
 
 def _check_number(who: str, name: str, value: object, low: float = 0.0) -> None:
@@ -81,7 +81,7 @@ def _check_number(who: str, name: str, value: object, low: float = 0.0) -> None:
 
 @dataclass(frozen=True)
 class Gains:
-    """Gains of one PID controller: output = p + i + d on the error; the integral is clamped.
+    """Gains of a PID controller: output = p + i + d on the error; the integral is clamped.
 
     Raises:
         PlatformError: a gain is not a finite number >= 0.
@@ -101,15 +101,17 @@ class Gains:
 class Platform:
     """A boat behind its autopilot.
 
-    Units: speeds m/s, accelerations m/s^2, turn rates deg/s, thrust and rudder in percent. For
-    ``kind="usv"`` the heading change per step is ``rudder * turn_gain/100 * dt * thrust/50`` deg and the
-    steady speed is ``thrust_map(thrust) * (1 - |rudder|/100 * turn_loss)``; a limit of 0 on acceleration or
-    deceleration means none. Integrators use ``max_turn_rate_dps``, ``max_acc`` and ``max_angular_acc_dps2``.
-    ``kind="rate"`` turns by a rate loop, see `rate`: besides those it uses ``max_dec`` (0: as ``max_acc``),
-    ``turn_rate_at_rest_dps``, ``turn_rate_per_mps``, ``turn_lag_s``, ``speed_lag_s``, ``turn_loss`` and, of its
-    ``heading_pid``, ``kp`` in 1/s. `ENTRIES` has a word on each.
+    Units: speeds m/s, accelerations m/s^2, turn rates deg/s, thrust and rudder in percent. `ENTRIES` explains each
+    setting.
 
-    When it is built it is run in its own model, once: it must come to its top speed, turn and stop.
+    For ``kind="usv"`` the heading change per step is ``rudder * turn_gain/100 * dt * thrust/50`` deg. The steady speed
+    is ``thrust_map(thrust) * (1 - |rudder|/100 * turn_loss)``. A limit of 0 on acceleration or deceleration means none.
+
+    Integrators use ``max_turn_rate_dps``, ``max_acc`` and ``max_angular_acc_dps2``. ``kind="rate"`` turns by a rate
+    loop, see `rate`. It also uses ``max_dec`` (0: as ``max_acc``), ``turn_rate_at_rest_dps``, ``turn_rate_per_mps``,
+    ``turn_lag_s``, ``speed_lag_s``, ``turn_loss`` and, of ``heading_pid``, ``kp`` in 1/s.
+
+    A new platform is simulated once in its own model: it must reach its top speed, turn and stop.
 
     Raises:
         PlatformError: a value is missing, non-finite or out of range, the kind is unknown, or the boat cannot move,
@@ -192,12 +194,12 @@ class Platform:
                 raise PlatformError(f"{who}: {name} is for boats of kind 'rate', this is a {self.kind!r}; leave it out")
 
     def pack(self) -> NDArray[np.float64]:
-        """Parameter row for compiled code, shape ``(N_PARAM,)``, laid out as in `layout`."""
+        """Return the parameter row for compiled code, shape ``(N_PARAM,)``, laid out as in `layout`."""
         row = np.zeros(L.N_PARAM)
         row[L.KIND] = KINDS[self.kind]
         shared = [name for name, entry in ENTRIES.items() if entry.kinds != RATE and name != "thrust_map"]
         own = [name for name, entry in ENTRIES.items() if entry.kinds == RATE] if self.kind == "rate" else []
-        for name in (*shared, *own):  # boats of kind rate have values of their own in columns that others use
+        for name in (*shared, *own):  # boats of kind rate use some columns of others for their own values
             value, column = getattr(self, name), ENTRIES[name].column
             values = astuple(value) if isinstance(value, Gains) else (value,)
             row[column : column + len(values)] = values
@@ -210,9 +212,9 @@ class Platform:
         return row
 
     def fastest_mps(self, dt_s: float) -> float:
-        """Highest speed over ground, m/s, in a step of ``dt_s``.
+        """Return the highest speed over ground, m/s, in a step of ``dt_s``.
 
-        A thrust boat moves with the mean of old and new speed, of which only the stored one is cut to top speed.
+        A thrust boat moves with the mean of old and new speed; only the stored speed is limited to top speed.
         """
         if self.kind != "usv":
             return self.max_speed_mps
@@ -224,7 +226,10 @@ class Platform:
         return max(self.max_speed_mps, 0.5 * (self.max_speed_mps + new))
 
     def max_turn_rate_at(self, speed_mps: float) -> float:
-        """Highest steady turn rate, deg/s, at a straight-line speed (m/s): full rudder at that speed's thrust."""
+        """Return the highest steady turn rate, deg/s, at a straight-line speed, m/s.
+
+        For a thrust boat this is at full rudder and that speed's thrust.
+        """
         if self.kind == "rate":
             free = self.turn_rate_at_rest_dps + self.turn_rate_per_mps * speed_mps
             return min(max(free, 0.0), self.max_turn_rate_dps)

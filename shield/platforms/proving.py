@@ -1,4 +1,4 @@
-"""A platform is a boat only if it moves, turns and stops in its own model; what the shield promises rests on that."""
+"""Check that a platform moves, turns and stops in its own model. The shield's guarantees rely on this."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ if TYPE_CHECKING:
     from .platform import Platform
 
 WITHIN_S = 60.0
-"""Time for each of the three, s: as long as the shield looks at boats at all (`limits.LONGEST_S`)."""
+"""Time for each of the three manoeuvres: the longest that the shield looks ahead (`limits.LONGEST_S`)."""
 DT_S = 0.1
 REACHED = 0.85
-"""Share of its top speed that a boat must come to; the simulators' large one has thrust for 0.875 of it."""
+"""Share of its top speed that a boat must reach; the simulators' large boat has thrust for 0.875 of it."""
 STOPPED = 0.05
-"""Share of its top speed below which a boat lies still."""
+"""Share of its top speed below which a boat counts as stopped."""
 TURN_DEG = 90.0
 NEAR_DEG = 30.0
-"""How near to the heading commanded, deg, the boat must come."""
+"""How near the boat must come to the commanded heading."""
 
 _REMEDIES = {
     "speed": {L.KIND_USV: "thrust_map, max_thrust and speed_pid or speed_factor"},
@@ -41,34 +41,34 @@ _REMEDIES = {
         L.KIND_DOUBLE_INTEGRATOR: "max_acc",
     },
 }
-"""Settings that a manoeuvre hangs on, by kind, where none alone is at fault; other kinds: `_LIMITS`."""
+"""Settings that a manoeuvre depends on, by kind, if no single one is at fault; other kinds: `_LIMITS`."""
 
 _LIMITS = {
     "speed": {"max_acc": L.MAX_ACC},
     "turn": {"max_turn_rate_dps": L.MAX_TURN_RATE, "max_angular_acc_dps2": L.MAX_ANGULAR_ACC},
     "stop": {"max_dec": L.MAX_DEC},
 }
-"""Limits of a manoeuvre; one of them alone may be at fault."""
+"""Limits of a manoeuvre, each of which alone may be at fault."""
 
 _LAGS = {
     "speed": ("speed_lag_s", L.SPEED_LAG),
     "turn": ("turn_lag_s", L.TURN_LAG),
     "stop": ("speed_lag_s", L.SPEED_LAG),
 }
-"""Of kind rate; so may its lag."""
+"""Lags of a manoeuvre for boats of kind rate, each of which alone may be at fault."""
 
 _AMPLE = 90.0
-"""No boat needs more of a limit to come to its speed, to turn or to stop: m/s2, deg/s, deg/s2."""
+"""More than any boat needs of a limit to reach its speed, to turn or to stop: m/s2, deg/s, deg/s2."""
 
 _unproved: ContextVar[bool] = ContextVar("unproved", default=False)
 
 
 @contextmanager
 def reference_models() -> Iterator[None]:
-    """Platforms built inside need not be boats: rails and cars with known answers, which models are checked by.
+    """While inside, new platforms are not checked. Models are tested on such rails and cars with known answers.
 
-    Never hand such a one to a shield. The package's own boats are built so too: its tests prove them, and importing it
-    compiles nothing.
+    Never give such a platform to a shield. The package's own boats are also built in here: its tests check them, so
+    that an import compiles nothing.
     """
     token = _unproved.set(True)
     try:
@@ -78,7 +78,7 @@ def reference_models() -> Iterator[None]:
 
 
 def fault_of(platform: Platform) -> str | None:
-    """What a platform cannot do in its own model, and which settings are in charge of it; None: nothing."""
+    """Describe what a platform cannot do in its own model, and which settings decide it; None if it has no fault."""
     if _unproved.get():
         return None
     return _fault_of(platform.pack().tobytes())
@@ -119,7 +119,10 @@ def _fault_in_stop(params: Array, state: Array) -> str:
 
 
 def _at_fault(manoeuvre: str, params: Array, state: Array, fault_in: Callable[[Array, Array], str]) -> str:
-    """The settings of which each alone, with another value, mends a manoeuvre begun in ``state``; else all of its."""
+    """Return the settings of which each alone, with another value, repairs a manoeuvre begun in ``state``.
+
+    If there are none, return all settings of the manoeuvre.
+    """
     kind, found = int(params[L.KIND]), []
     trials = [(name, column, max(_AMPLE, float(params[column]))) for name, column in _LIMITS[manoeuvre].items()]
     if kind == L.KIND_RATE:
@@ -133,7 +136,7 @@ def _at_fault(manoeuvre: str, params: Array, state: Array, fault_in: Callable[[A
 
 
 def _run(params: Array, state: Array, speed_mps: float, error_deg: float) -> float:
-    """Highest speed, m/s, of a run under one command, straight ahead."""
+    """Return the highest speed, m/s, of a run under one command, straight ahead."""
     highest = 0.0
     for _ in range(round(WITHIN_S / DT_S)):
         step_boat(params, state, speed_mps, error_deg, DT_S)
@@ -142,7 +145,7 @@ def _run(params: Array, state: Array, speed_mps: float, error_deg: float) -> flo
 
 
 def _turn(params: Array, state: Array, speed_mps: float) -> float:
-    """Smallest distance, deg, from the heading commanded."""
+    """Return the smallest distance, deg, from the commanded heading."""
     goal, nearest = float(state[L.HEADING]) + TURN_DEG, TURN_DEG
     for _ in range(round(WITHIN_S / DT_S)):
         error_deg = float(wrap_degrees(goal - state[L.HEADING]))

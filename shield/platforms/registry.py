@@ -1,4 +1,4 @@
-"""The boats the package knows, by name: the files of ``shipped``, the simulator's two integrators, registered ones."""
+"""Known boats by name: the files of ``shipped``, the simulator's two integrators, and registered boats."""
 
 from __future__ import annotations
 
@@ -14,12 +14,13 @@ from .platform import Platform
 from .proving import reference_models
 
 GROUP = "steerclear.platforms"
-"""Entry points of this group name boats of other packages: a `Platform`, a function that builds one, or a module that
-registers some."""
+"""Entry-point group of other packages: each entry names a `Platform`, a function that builds one, or a module that
+registers some.
+"""
 Boat = TypeVar("Boat", bound="Platform | str | Path | Callable[[], Platform]")
 SHIPPED = Path(__file__).parent / "shipped"
 
-with reference_models():  # proved by the tests: importing them compiles nothing
+with reference_models():  # the tests check them, so importing compiles nothing
     _FILES = {path.stem: load_platform(path).platform for path in sorted(SHIPPED.glob("*.yaml"))}
 
     SINGLE_INTEGRATOR = Platform(name="si", kind="single_integrator", max_speed_mps=10.0, max_turn_rate_dps=90.0)
@@ -41,16 +42,16 @@ HERON = PLATFORMS["heron"]
 
 
 def register_platform(boat: Boat) -> Boat:
-    """Make a boat known by its name, in this process; a decorator, too, of a function that builds one.
+    """Register a boat by its name, in this process. Also a decorator of a function that builds one.
 
     Args:
         boat: the platform, its file (``.yaml``), or a function that builds it.
 
     Returns:
-        What was given.
+        The argument.
 
     Raises:
-        PlatformError: another boat has that name, it could be read as a file's, or it is no boat.
+        PlatformError: another boat has that name, the name looks like a file's, or it is no boat.
     """
     found = boat() if callable(boat) else load_platform(boat).platform if isinstance(boat, str | Path) else boat
     if not isinstance(found, Platform):
@@ -63,16 +64,16 @@ def register_platform(boat: Boat) -> Boat:
 
 
 def known_platforms() -> dict[str, Platform]:
-    """All boats by name: ours, those registered here, and those of other packages' entry points."""
+    """Return all boats by name: ours, those registered here, and those of other packages' entry points."""
     load_others(GROUP, register_platform)
     return dict(PLATFORMS)
 
 
 def get_platform(name: str | Platform) -> Platform:
-    """The platform of that name, or of that file (``.yaml``); a `Platform` passes through.
+    """Return the platform of that name, or of that file (``.yaml``); a `Platform` passes through.
 
     Raises:
-        PlatformError: no platform has that name, with the list of those that exist, or its file is no boat.
+        PlatformError: no platform has that name (the message lists those that exist), or its file is no boat.
     """
     if isinstance(name, Platform):
         return name

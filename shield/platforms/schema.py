@@ -1,4 +1,4 @@
-"""What a platform file may say: words on kinds, gains and measured entries, and units that others use."""
+"""Contents of a platform file: words on kinds, gains and measured entries, and units that others use."""
 
 from __future__ import annotations
 
@@ -53,4 +53,4 @@ UNITS_TAKEN_FOR_OTHERS = {
     "cm": "m: centimetres divided by 100",
     "deg": "the unit the entry's name ends with",
 }
-"""Endings of keys that say another unit than the file's, and how to convert."""
+"""Endings of keys that mean another unit than the file's, and how to convert."""

@@ -1,8 +1,8 @@
-"""One step of any platform: the single place where dynamics are chosen by kind; and commands held for several moves.
+"""One step of any platform. Only here the kind selects the dynamics. Commands may be held for several substeps.
 
-Games may ask for a command once and move the boat several times by it, subtracting no turn made meanwhile: what is held
-is the error, not the course. A parameter row with one entry more, `layout.MOVE_S`, says how long a move of the boat is;
-a longer step is then made of several. Rows without it are of boats whose every step is one move.
+Some games take one command and move the boat several times under it without subtracting the turn made meanwhile: the
+heading error is held, not the course. A parameter row with one more entry, `layout.MOVE_S`, gives the length of a
+substep; a longer step is made of several. Without that entry every step is one substep.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from .rate import step_double_integrator, step_rate, step_single_integrator
 from .usv import clamp, controller, next_speed, next_thrust, step_usv, turn_of_rudder
 
 HALVINGS = 44
-"""Halvings of the range of heading errors, 358 deg, that leave 1e-11 deg of it."""
+"""Halvings that reduce the range of heading errors, 358 deg, to 1e-11 deg."""
 
 
 @lean_kernel
 def moves_in(params: Array, dt_s: float) -> int:
-    """Moves of the boat in a step."""
+    """Return the number of substeps in a step."""
     if params.shape[0] <= L.MOVE_S:
         return 1
     return max(1, int(dt_s / params[L.MOVE_S] + 0.5))
@@ -26,13 +26,13 @@ def moves_in(params: Array, dt_s: float) -> int:
 
 @lean_kernel
 def _next_speed(params: Array, speed_mps: float, thrust: float, rudder: float, move_s: float) -> float:
-    """Speed stored after a move, m/s, as `usv.move_along_mean` stores it."""
+    """Return the stored speed after a substep, m/s, as `usv.move_along_mean` stores it."""
     return clamp(0.5 * (next_speed(params, speed_mps, thrust, rudder, move_s) + speed_mps), 0.0, params[L.MAX_SPEED])
 
 
 @lean_kernel
 def turn_at_rudder(params: Array, state: Array, speed_mps: float, rudder: float, move_s: float, moves: int) -> float:
-    """Turn, deg, of a thrust boat in so many moves with the rudder, percent, held; ``state`` is left as it is."""
+    """Return the turn, deg, of a thrust boat in ``moves`` substeps with the rudder, percent, held; ``state`` stays."""
     speed, thrust = state[L.SPEED], state[L.THRUST]
     error, integral, turn = state[L.SPEED_ERROR], state[L.SPEED_INTEGRAL], 0.0
     for _ in range(moves):
@@ -45,7 +45,7 @@ def turn_at_rudder(params: Array, state: Array, speed_mps: float, rudder: float,
 
 @lean_kernel
 def turn_of_error(params: Array, state: Array, speed_mps: float, error_deg: float, move_s: float, moves: int) -> float:
-    """Turn, deg, that the autopilot of a thrust boat makes of a heading error held for so many moves."""
+    """Return the turn, deg, of a thrust boat whose autopilot holds a heading error for ``moves`` substeps."""
     speed, thrust, last, memory = state[L.SPEED], state[L.THRUST], state[L.HEADING_ERROR], state[L.HEADING_INTEGRAL]
     error, integral, turn = state[L.SPEED_ERROR], state[L.SPEED_INTEGRAL], 0.0
     limit = min(params[L.MAX_RUDDER], 100.0)
@@ -70,9 +70,9 @@ def turn_of_error(params: Array, state: Array, speed_mps: float, error_deg: floa
 def error_for_turn(
     params: Array, state: Array, speed_mps: float, turn_deg: float, farthest_deg: float, move_s: float, moves: int
 ) -> float:
-    """Heading error, deg, to hold so that the boat turns by that much in so many moves, or as nearly as it can.
+    """Return the heading error, deg, to hold for a turn of ``turn_deg`` in ``moves`` substeps, or the nearest turn.
 
-    The turn grows with the error, so the range of errors is halved until they meet.
+    The turn grows with the error, so bisection finds it.
     """
     low, high = -farthest_deg, farthest_deg
     for _ in range(HALVINGS):
@@ -86,7 +86,7 @@ def error_for_turn(
 
 @lean_kernel
 def step_boat(params: Array, state: Array, desired_speed_mps: float, heading_error_deg: float, dt_s: float) -> None:
-    """Advance one boat's ``state`` by one step, in one move or several, under a speed, m/s, and heading error, deg."""
+    """Advance one boat's ``state`` by one step, in one or several substeps; speed in m/s, heading error in deg."""
     moves = moves_in(params, dt_s)
     for _ in range(moves):
         _move_boat(params, state, desired_speed_mps, heading_error_deg, dt_s / moves)

@@ -1,8 +1,8 @@
-"""Thrust-and-rudder boat behind a heading and speed controller, one compiled step.
+"""Thrust-and-rudder boat behind a heading and a speed controller, one compiled step.
 
-The model is the one of MOOS-IvP's uSimMarine (thrust map, turn loss, turn rate) behind pMarinePID, as the
-competition's simulator uses it. ``step_usv`` is the whole boat as a policy sees it; ``actuate_usv`` is the
-hull alone, for predictions that choose rudder and speed command directly.
+The model is that of MOOS-IvP's uSimMarine (thrust map, turn loss, turn rate) behind pMarinePID, as used by the
+competition's simulator. ``step_usv`` is the whole boat as a policy commands it. ``actuate_usv`` is the hull with the
+speed controller, for predictions that choose rudder and speed command directly.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from . import layout as L
 
 @lean_kernel
 def wrap_degrees(angle_deg: float) -> float:
-    """Angle brought into [-180, 180]; both ends are kept, as the reference simulator keeps them.
+    """Wrap an angle into [-180, 180]; both ends occur, as in the reference simulator.
 
-    A non-finite angle gives NaN: a loop on infinity would never end.
+    A non-finite angle gives NaN.
     """
     if not abs(angle_deg) <= 540.0:
         angle_deg = np.fmod(angle_deg, 360.0)
@@ -32,7 +32,7 @@ def wrap_degrees(angle_deg: float) -> float:
 
 @lean_kernel
 def clamp(value: float, low: float, high: float) -> float:
-    """Value limited to [low, high]; NaN stays NaN."""
+    """Limit a value to [low, high]; NaN stays NaN."""
     if value > high:
         return high
     if value < low:
@@ -42,7 +42,7 @@ def clamp(value: float, low: float, high: float) -> float:
 
 @lean_kernel
 def speed_of_thrust(params: Array, thrust: float) -> float:
-    """Steady straight-line speed, m/s, that a thrust (percent) gives; flat beyond the map's ends."""
+    """Return the steady straight-line speed, m/s, of a thrust, percent; constant beyond the map's ends."""
     size = int(params[L.MAP_SIZE])
     if thrust <= params[L.MAP_THRUST]:
         return params[L.MAP_SPEED]
@@ -60,7 +60,7 @@ def speed_of_thrust(params: Array, thrust: float) -> float:
 def controller(
     kp: float, ki: float, kd: float, limit: float, error: float, previous_error: float, integral: float, dt_s: float
 ) -> tuple[float, float]:
-    """PID output before clamping and its new integral; the derivative is 0 on the first call (NaN memory)."""
+    """Return a PID's output before clamping, and its new integral; the derivative is 0 on the first call (NaN)."""
     derivative = 0.0
     if not math.isnan(previous_error):
         derivative = (error - previous_error) / dt_s
@@ -72,7 +72,7 @@ def controller(
 def next_thrust(
     params: Array, speed_mps: float, thrust: float, error: float, integral: float, desired_mps: float, dt_s: float
 ) -> tuple[float, float, float]:
-    """Thrust of this step and the speed controller's new memory (error, integral), from the old ones."""
+    """Return the thrust of this step and the speed controller's new memory (error, integral)."""
     if params[L.SPEED_FACTOR] != 0.0:
         thrust = desired_mps * params[L.SPEED_FACTOR]
     else:
@@ -109,7 +109,7 @@ def update_thrust(params: Array, state: Array, desired_speed_mps: float, dt_s: f
 
 @lean_kernel
 def update_rudder(params: Array, state: Array, heading_error_deg: float, dt_s: float) -> None:
-    """Advance the heading controller; without thrust the rudder is 0 and its memory stays as it was."""
+    """Advance the heading controller; without thrust the rudder is 0 and the memory does not change."""
     if not state[L.THRUST] > 0.0:
         state[L.RUDDER] = 0.0
         return
@@ -131,7 +131,7 @@ def update_rudder(params: Array, state: Array, heading_error_deg: float, dt_s: f
 
 @lean_kernel
 def turn_of_rudder(params: Array, thrust: float, rudder: float, dt_s: float) -> float:
-    """Heading change, deg, of one step with way on: proportional to rudder and to thrust."""
+    """Return the heading change, deg, of one step of a moving boat: proportional to rudder and to thrust."""
     turn = rudder * (params[L.TURN_GAIN] / 100.0) * dt_s * (1.0 + (abs(thrust) - 50.0) / 50.0)
     if thrust < 0.0:
         turn = -turn
@@ -140,19 +140,19 @@ def turn_of_rudder(params: Array, thrust: float, rudder: float, dt_s: float) -> 
 
 @lean_kernel
 def next_speed(params: Array, speed_mps: float, thrust: float, rudder: float, dt_s: float) -> float:
-    """Speed at the end of a step, m/s, before the hull's mean is stored."""
+    """Return the speed at the end of a step, m/s, before the mean with the old one is stored."""
     return speed_towards(params, speed_mps, speed_of_thrust(params, thrust) * kept_share(params, rudder), dt_s)
 
 
 @lean_kernel
 def kept_share(params: Array, rudder: float) -> float:
-    """Share of its speed that a boat keeps in a turn with a rudder, percent."""
+    """Return the share of its speed that a boat retains in a turn at a rudder, percent."""
     return 1.0 - (abs(rudder) / 100.0) * params[L.TURN_LOSS]
 
 
 @lean_kernel
 def speed_towards(params: Array, speed_mps: float, speed: float, dt_s: float) -> float:
-    """Speed at the end of a step that tends to ``speed``, m/s, as fast as the platform may gain or lose it."""
+    """Return the speed at the end of a step that tends to ``speed``, m/s, within the platform's limits."""
     max_acc = params[L.MAX_ACC]
     max_dec = params[L.MAX_DEC]
     if max_acc > 0.0 and (speed - speed_mps) / dt_s > max_acc:
@@ -176,7 +176,7 @@ def advance_hull(params: Array, state: Array, dt_s: float) -> None:
 
 @lean_kernel
 def move_along_mean(params: Array, state: Array, speed_mps: float, heading_deg: float, dt_s: float) -> None:
-    """Move with the mean of old and new speed along the mean heading; the mean speed is what is stored."""
+    """Move with the mean of old and new speed along the mean heading; store the mean speed."""
     mean_speed = 0.5 * (speed_mps + state[L.SPEED])
     mean_heading = math.radians(0.5 * (state[L.HEADING] + heading_deg))
     state[L.X] += math.sin(mean_heading) * mean_speed * dt_s
@@ -187,7 +187,7 @@ def move_along_mean(params: Array, state: Array, speed_mps: float, heading_deg: 
 
 @lean_kernel
 def step_usv(params: Array, state: Array, desired_speed_mps: float, heading_error_deg: float, dt_s: float) -> None:
-    """One full step: speed controller, heading controller, hull. Changes ``state`` in place."""
+    """Advance a boat by one full step: speed controller, heading controller, hull. Changes ``state`` in place."""
     update_thrust(params, state, desired_speed_mps, dt_s)
     update_rudder(params, state, heading_error_deg, dt_s)
     advance_hull(params, state, dt_s)
@@ -195,7 +195,7 @@ def step_usv(params: Array, state: Array, desired_speed_mps: float, heading_erro
 
 @lean_kernel
 def actuate_usv(params: Array, state: Array, desired_speed_mps: float, rudder: float, dt_s: float) -> None:
-    """One step with the rudder given (percent) instead of asked of the heading controller."""
+    """Advance a boat by one step with a given rudder, percent, instead of the heading controller's."""
     update_thrust(params, state, desired_speed_mps, dt_s)
     limit = min(params[L.MAX_RUDDER], 100.0)
     state[L.RUDDER] = clamp(rudder, -limit, limit) if state[L.THRUST] > 0.0 else 0.0
@@ -203,11 +203,11 @@ def actuate_usv(params: Array, state: Array, desired_speed_mps: float, rudder: f
 
 
 def fresh_state(x_m: float, y_m: float, heading_deg: float, speed_mps: float = 0.0) -> np.ndarray:
-    """State row of a boat whose autopilot has not run yet.
+    """Return the state row of a boat whose autopilot has not run yet.
 
-    Its thrust is 0, also of a boat that moves: such a one coasts, and can hardly turn for seconds. For a boat that has
-    been holding its speed set ``row[L.THRUST]`` to `shield.tracks.thrust_at` (params, speed m/s), which is what the
-    shield takes boats to have whose thrust it is not told (`Fleet.of`).
+    Its thrust is 0, even if the boat moves: it coasts, and can hardly turn for seconds. For a boat that has been
+    holding its speed, set ``row[L.THRUST]`` to `shield.tracks.thrust_at` (params, speed m/s). The shield assumes that
+    thrust for boats whose thrust it does not receive (`Fleet.of`).
 
     Returns:
         Array of shape ``(N_STATE,)``, float64.

@@ -1,4 +1,4 @@
-"""Sets of relative positions in which a separation radius cannot be kept: areas, reach, outline."""
+"""Sets of relative positions from which a separation cannot be guaranteed: areas, extent, outline."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from .files import ValueTable, stack_tables
 from .lookup import WHOLE_S, Tables, table_value
 
 HEADINGS_DEG = (0.0, 45.0, 90.0, 135.0, 180.0)
-"""Relative headings at which areas are reported; 180 is head-on."""
+"""Relative headings of reported areas; 180 is head-on."""
 SPEED_SHARES = ((1.0, 1.0), (0.5, 1.0), (1.0, 0.5))
-"""Speed pairs at which areas are reported: shares of the own and the other's top speed."""
+"""Speed pairs of reported areas: shares of the own and the other's top speed."""
 FINE_RANGES = 1000
 FINE_BEARINGS = 361
 
@@ -22,7 +22,7 @@ FINE_BEARINGS = 361
 def unsafe(
     table: ValueTable, radius_m: float, heading_deg: float, own_mps: float, other_mps: float
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Where the radius cannot be kept: ranges, m, bearings, rad, and the answer over both."""
+    """Return ranges, m, bearings, rad, and where over both the radius cannot be guaranteed."""
     ranges = np.linspace(0.0, table.card.make_grid().rho_last_m, FINE_RANGES)
     bearings = np.radians(np.linspace(-180.0, 180.0, FINE_BEARINGS))
     values = _plane(stack_tables([table]), ranges, bearings, math.radians(heading_deg), own_mps, other_mps)
@@ -33,7 +33,7 @@ def unsafe(
 def _plane(
     tables: Tables, ranges_m: Array, bearings_rad: Array, heading_rad: float, own_mps: float, other_mps: float
 ) -> Array:
-    """Values, m, over ranges and bearings, of an other boat of a relative heading."""
+    """Return values, m, over ranges and bearings, for another boat of a relative heading."""
     values = np.empty((ranges_m.shape[0], bearings_rad.shape[0]))
     for i in range(ranges_m.shape[0]):
         for k in range(bearings_rad.shape[0]):
@@ -43,21 +43,21 @@ def _plane(
 
 
 def area_m2(table: ValueTable, radius_m: float, heading_deg: float, own_mps: float, other_mps: float) -> float:
-    """Area, m^2, of the relative positions in which the radius cannot be kept."""
+    """Return the area, m^2, of the relative positions from which the radius cannot be guaranteed."""
     ranges, _bearings, inside = unsafe(table, radius_m, heading_deg, own_mps, other_mps)
     share = inside[:, :-1].mean(axis=1) * 2.0 * math.pi
     return float((share * ranges).sum() * (ranges[1] - ranges[0]))
 
 
 def reach_ahead_m(table: ValueTable, radius_m: float, heading_deg: float, own_mps: float, other_mps: float) -> float:
-    """Largest range dead ahead, m, from which the radius cannot be kept."""
+    """Return the largest range dead ahead, m, from which the radius cannot be guaranteed; 0 if there is none."""
     ranges, _, inside = unsafe(table, radius_m, heading_deg, own_mps, other_mps)
     ahead = inside[:, FINE_BEARINGS // 2]
     return float(ranges[ahead].max()) if ahead.any() else 0.0
 
 
 def area_table(table: ValueTable, radii_m: tuple[float, ...]) -> dict[str, dict[str, list[float]]]:
-    """Areas, m^2, by radius and speed pair, over `HEADINGS_DEG`."""
+    """Return areas, m^2, by radius and speed pair, over `HEADINGS_DEG`."""
     grid = table.card.make_grid()
     found: dict[str, dict[str, list[float]]] = {}
     for radius in radii_m:

@@ -1,4 +1,4 @@
-"""Two boats of the full model, the own one steered by the table, compiled: what the table's promise is worth."""
+"""Runs of two boats of the full model, compiled. The own boat follows the table, to measure the table's error."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from .moves import SUB_STEP_S, run_hull
 from .sweep import closest
 
 GREEDY, LEAD, PURE, WANDER = 0, 1, 2, 3
-"""What the other boat does: lower the value, steer at where we will be, steer at us, or steer at random."""
+"""What the other boat does: lower the value, steer at our predicted place, steer at us, or steer at random."""
 N_RUDDERS = 5
 
 
 @kernel
 def look_ahead(params: Array, state: Array, trails: Array, ends: Array) -> None:
-    """Fill trails (rudders, sub-steps, 2) and ends (rudders, 2: turn in rad, speed) of one table step."""
+    """Fill trails (rudders, sub-steps, 2) and ends (rudders, 2: turn in rad, speed) for one table step."""
     start = np.zeros(L.N_STATE)
     for r in range(N_RUDDERS):
         start[:] = 0.0
@@ -36,7 +36,7 @@ def look_ahead(params: Array, state: Array, trails: Array, ends: Array) -> None:
 def pair_value(
     tables: Tables, table: int, own: Array, other: Array, own_trail: Array, own_end: Array, trail: Array, end: Array
 ) -> float:
-    """Value after one table step of both boats, closest approach within it included."""
+    """Return the value after one table step of both boats, including the closest approach within it."""
     dx, dy = other[L.X] - own[L.X], other[L.Y] - own[L.Y]
     heading, theirs = math.radians(own[L.HEADING]), math.radians(other[L.HEADING])
     sin, cos = math.sin(heading), math.cos(heading)
@@ -54,9 +54,10 @@ def pair_value(
 def best_rudders(
     tables: Tables, table: int, params: Array, own: Array, other: Array, cooperative: bool, steps: int
 ) -> tuple[float, float, float]:
-    """Value of the best own rudder against the other's answer, and both rudders (share of full).
+    """Return the value of the best own rudder against the other's answer, and both rudders (share of full).
 
-    ``params`` (2, N_PARAM) and state rows are those of the own boat and the other; a table step has so many ``steps``.
+    ``params`` (2, N_PARAM) and the state rows are of the own boat and the other. ``steps`` is the number of sub-steps
+    in a table step.
     """
     own_trails, own_ends = np.empty((N_RUDDERS, steps, 2)), np.empty((N_RUDDERS, 2))
     trails, ends = np.empty((N_RUDDERS, steps, 2)), np.empty((N_RUDDERS, 2))
@@ -78,7 +79,7 @@ def best_rudders(
 
 @kernel
 def steer(params: Array, state: Array, rudder: float) -> None:
-    """One step of the full model through its autopilot: top speed commanded, rudder (share of full) asked for."""
+    """Advance the full model by one step through its autopilot, at top speed and with a rudder (share of full)."""
     top = params[L.MAX_SPEED]
     turn = rudder * abs(turn_of_rudder(params, params[L.MAX_THRUST], min(params[L.MAX_RUDDER], 100.0), SUB_STEP_S))
     step_boat(params, state, top, command_for_turn(params, state, top, turn, SUB_STEP_S), SUB_STEP_S)
@@ -86,7 +87,7 @@ def steer(params: Array, state: Array, rudder: float) -> None:
 
 @kernel
 def chase(params: Array, pursuer: Array, prey: Array, lead: bool) -> float:
-    """Rudder that turns the pursuer onto the prey, or onto where the prey will be when reached."""
+    """Return the rudder that turns the pursuer onto the prey, or onto the prey's place at the time of arrival."""
     dx, dy = prey[L.X] - pursuer[L.X], prey[L.Y] - pursuer[L.Y]
     if lead:
         time = math.sqrt(dx * dx + dy * dy) / max(pursuer[L.SPEED] + 0.5 * prey[L.SPEED], 0.5)
@@ -110,9 +111,10 @@ def duel(
     table_steps: int,
     steps: int,
 ) -> float:
-    """Closest distance, m, over a run of the full model of so many ``steps``; changes both state rows.
+    """Return the closest distance, m, over a run of the full model of ``steps`` steps; changes both state rows.
 
-    Arguments as of `best_rudders`; ``manner`` is what the other does where both do not play the table's joint best.
+    Arguments as for `best_rudders`. ``manner`` is what the other boat does, unless both follow the table's joint
+    optimum.
     """
     nearest = math.sqrt((own[L.X] - other[L.X]) ** 2 + (own[L.Y] - other[L.Y]) ** 2)
     for _ in range(steps):

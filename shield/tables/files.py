@@ -1,6 +1,6 @@
-"""Value tables on disk, shipped with the package or made on demand and checked whenever they are read, and their cards.
+"""Value tables on disk and their cards: shipped with the package or solved on demand, checked on every read.
 
-A card says what a table was solved for and how good it is; it is kept as JSON inside the table's file.
+A card states what a table was solved for and how accurate it is. It is stored as JSON inside the table's file.
 """
 
 from __future__ import annotations
@@ -29,51 +29,51 @@ from .settings import OtherMay, Problem, read_other_may, table_name
 from .solve import Progress, write_whole
 
 CACHE_VARIABLE = "STEERCLEAR_TABLES"
-"""Environment variable that names the folder of tables made on demand."""
+"""Environment variable with the folder of tables solved on demand."""
 SHIPPED = Path(__file__).parent / "shipped"
 FORMAT = 1
 """Version of the table files."""
 
 
 def platform_digest(platform: Platform) -> str:
-    """Digest of a platform's parameters; a table is valid for exactly these."""
+    """Return a digest of a platform's parameters; a table is valid for exactly these."""
     return hashlib.sha256(platform.pack().tobytes()).hexdigest()[:16]
 
 
 @dataclass(frozen=True)
 class Card:
-    """What a value table is.
+    """Description of a value table.
 
-    The table is valid for an own boat whose thrust is at its maximum; its other boat may have any thrust.
+    The table is valid for an own boat at maximum thrust; the other boat may have any thrust.
     """
 
     own: str  # platforms' names
     other: str
     own_parameters: str  # digests of their parameters
     other_parameters: str
-    other_may: str  # what the other boat is granted
-    grid: dict[str, Any]  # nodes of the table, as of `Grid`
+    other_may: str  # what the other boat may do
+    grid: dict[str, Any]  # nodes of the table, see `Grid`
     dt_s: float  # table step and longest play, s
     horizon_s: float
-    iterations: int  # steps done until the end
+    iterations: int  # iterations done
     residual_m: float  # largest change of a value in the last step, m
     payload_sha256: str = ""  # digest of the packed values
     version: str = ""  # version of the package that solved it
-    checked_radii_m: tuple[float, ...] = ()  # separation radii for which convergence and margin were checked, m
-    # share by which the sets {V < radius} change on a coarser grid, by radius
+    checked_radii_m: tuple[float, ...] = ()  # separation radii whose convergence and margin were checked, m
+    # by radius, the share by which the sets {V < radius} change on a coarser grid
     convergence: dict[str, Any] = field(default_factory=dict)
     # areas of {V < radius}, m^2, by radius and speed pair, over relative headings
     areas_m2: dict[str, Any] = field(default_factory=dict)
     model_error: dict[str, Any] = field(default_factory=dict)  # error of the reduced model against the full one
-    # outcome of closed-loop runs of the full model; empty when not run
+    # results of closed-loop runs of the full model; empty if not run
     margin: dict[str, Any] = field(default_factory=dict)
-    levels_s: tuple[float, ...] = ()  # shorter times T for which V(x, T) is kept as well, s
-    # how far ahead, m, the set {V(x, T) < radius} reaches head-on at top speeds, by T and radius
+    levels_s: tuple[float, ...] = ()  # shorter times T for which V(x, T) is stored as well, s
+    # by T and radius, how far ahead, m, the set {V(x, T) < radius} extends head-on at top speeds
     levels: dict[str, Any] = field(default_factory=dict)
     format: int = FORMAT
 
     def to_json(self) -> str:
-        """The card as text."""
+        """Return the card as text."""
         return json.dumps(asdict(self), indent=1, sort_keys=True)
 
     @staticmethod
@@ -81,7 +81,7 @@ class Card:
         """Read a card.
 
         Raises:
-            TableError: the text is no card of this version of the format.
+            TableError: the text is no card of this format version.
         """
         try:
             content = json.loads(text)
@@ -96,7 +96,7 @@ class Card:
         return card
 
     def make_grid(self) -> Grid:
-        """The grid of the table."""
+        """Return the grid of the table."""
         return Grid(**self.grid)
 
 
@@ -104,18 +104,18 @@ class Card:
 class ValueTable:
     """A packed table and its card."""
 
-    card: Card  # what it is
+    card: Card  # its description
     values: NDArray[np.uint8]  # uint8 over the grid, in steps of cap / 255, rounded down; for the whole play
-    # the same for each time of the card's ``levels_s``, shape ``(levels, *grid)``; no lower than ``values``
+    # the same for each time in the card's ``levels_s``, shape ``(levels, *grid)``; at least ``values``
     levels: NDArray[np.uint8]
 
     def values_m(self) -> NDArray[np.float64]:
-        """Values in m, over the grid."""
+        """Return the values in m, over the grid."""
         return self.values.astype(np.float64) * (self.card.make_grid().cap_m / STEPS)
 
 
 def pack_values(problem: Problem, state: Progress) -> ValueTable:
-    """Pack a solved table, values rounded down; its card has no figures yet."""
+    """Pack a solved table, with values rounded down; the accuracy figures of its card are still empty."""
     grid = problem.grid
     values = pack(state.values, grid.cap_m).reshape(grid.shape)
     kept_s = LEVELS_S if problem.other_may is OtherMay.WORST_CASE else ()
@@ -151,17 +151,17 @@ def _digest(values: NDArray[np.uint8], levels: NDArray[np.uint8]) -> str:
 
 
 def _more(levels: NDArray[np.uint8], values: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """How much each level tells more than the next longer one: mostly nothing."""
+    """Return by how much each level exceeds the next longer one: mostly 0, so it compresses well."""
     return levels - np.concatenate([levels[1:], values[None]]) if len(levels) else levels
 
 
 def _levels(more: NDArray[np.uint8], values: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """The levels again, from the longest down."""
+    """Return the levels from their differences, from the longest down."""
     return values + np.add.accumulate(more[::-1], axis=0, dtype=np.uint8)[::-1] if len(more) else more
 
 
 def cache_folder() -> Path:
-    """Folder of tables made on demand: `CACHE_VARIABLE`, else the platform's cache folder."""
+    """Return the folder of tables solved on demand: `CACHE_VARIABLE`, otherwise the platform's cache folder."""
     named = os.environ.get(CACHE_VARIABLE)
     if named:
         return Path(named)
@@ -175,7 +175,7 @@ def cache_folder() -> Path:
 
 
 def save_table(table: ValueTable, path: Path) -> None:
-    """Write a table; never leaves a half-written file under its name.
+    """Write a table; never leave a partial file under its name.
 
     Raises:
         TableError: the file cannot be written.
@@ -190,7 +190,7 @@ def save_table(table: ValueTable, path: Path) -> None:
 
 
 def read_table(path: Path) -> ValueTable:
-    """Read a table file and check that it is whole.
+    """Read a table file and check that it is complete.
 
     Raises:
         TableError: the file is missing, cut short, altered or of another format.
@@ -205,7 +205,7 @@ def read_table(path: Path) -> ValueTable:
         raise
     except FileNotFoundError as error:
         raise TableError(f"there is no table file {path}") from error
-    except Exception as error:  # zip, zlib and numpy each have several ways to say that bytes make no sense
+    except Exception as error:  # zip, zlib and numpy have many exceptions for invalid bytes
         raise TableError(f"table file {path} is damaged ({error})") from error
     card = Card.of_json(text)
     shape = card.make_grid().shape
@@ -222,13 +222,13 @@ def read_table(path: Path) -> ValueTable:
 
 
 def remedy(own: str, other: str, other_may: OtherMay) -> str:
-    """The command that makes a table."""
-    boats = [name if name in PLATFORMS else f"{name}.yaml" for name in (own, other)]  # others come from files
+    """Return the command that solves a table."""
+    boats = [name if name in PLATFORMS else f"{name}.yaml" for name in (own, other)]  # other boats come from files
     return f"steerclear reach solve --own {boats[0]} --other {boats[1]} --other-may {other_may.value}"
 
 
 def find_table(own: str, other: str, other_may: OtherMay) -> Path | None:
-    """File of a table: one made on demand goes before the shipped one; None when there is neither."""
+    """Return the file of a table, or None. One solved on demand takes precedence over the shipped one."""
     name = f"{table_name(own, other, other_may)}.npz"
     return next((folder / name for folder in (cache_folder(), SHIPPED) if (folder / name).is_file()), None)
 
@@ -236,10 +236,10 @@ def find_table(own: str, other: str, other_may: OtherMay) -> Path | None:
 def load_table(
     own: str | Platform, other: str | Platform, other_may: str | OtherMay = OtherMay.WORST_CASE
 ) -> ValueTable:
-    """The table of a pair, checked against the boats' parameters.
+    """Return the table of a pair, checked against the boats' parameters.
 
     Raises:
-        TableError: it is missing, damaged or made for other parameters; the message names the command to make it.
+        TableError: it is missing, damaged or made for other parameters; the message names the command that makes it.
     """
     boats, mode = (get_platform(own), get_platform(other)), read_other_may(other_may)
     return _load(*boats, mode, str(cache_folder()))
@@ -274,7 +274,7 @@ def check_parameters(card: Card, own: Platform, other: Platform, mode: OtherMay)
 
 
 def stack_tables(tables: Sequence[ValueTable]) -> Tables:
-    """Put tables behind one another; one without shorter times tells of the whole play at any time."""
+    """Concatenate tables. A table without shorter times uses its values for the whole play at any time."""
     if not tables:
         return no_tables()
     blocks: list[NDArray[np.uint8]] = []
@@ -293,7 +293,7 @@ def stack_tables(tables: Sequence[ValueTable]) -> Tables:
 
 
 def _full_from_m(table: ValueTable, values: NDArray[np.uint8]) -> float:
-    """Range, m, no less than the cap, from which on values are nothing but that; infinite where there is none."""
+    """Return the range, m, at least the cap, from which all values equal the cap; infinite if there is none."""
     grid = table.card.make_grid()
     below = np.flatnonzero((values != STEPS).any(axis=(1, 2, 3, 4)))
     first = int(below[-1]) + 1 if len(below) else 0
@@ -301,5 +301,5 @@ def _full_from_m(table: ValueTable, values: NDArray[np.uint8]) -> float:
 
 
 def with_figures(table: ValueTable, **figures: object) -> ValueTable:
-    """The table with figures added to its card."""
+    """Return the table with figures added to its card."""
     return replace(table, card=replace(table.card, **figures))  # type: ignore[arg-type]

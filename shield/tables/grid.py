@@ -13,7 +13,7 @@ from ..exceptions import TableError
 from ..jit import Array, kernel
 
 N_AXES = 11
-"""Numbers that describe a grid to compiled code; see `Grid.pack`."""
+"""Numbers that describe a grid to compiled code, see `Grid.pack`."""
 RHO_FIRST, RHO_STEP, RHO_GROWTH = 0, 1, 2
 N_RHO, N_PSI, N_BETA, N_OWN, N_OTHER = 3, 4, 5, 6, 7
 OWN_TOP, OTHER_TOP, CAP = 8, 9, 10
@@ -21,13 +21,13 @@ OWN_TOP, OTHER_TOP, CAP = 8, 9, 10
 
 @kernel
 def rho_node(axes: Array, i: int) -> float:
-    """Range of node i, m: spacing grows evenly from node to node."""
+    """Return the range of node i, m; the spacing grows evenly from node to node."""
     return axes[RHO_FIRST] + axes[RHO_STEP] * i + 0.5 * axes[RHO_GROWTH] * i * (i - 1)
 
 
 @kernel
 def rho_place(axes: Array, rho_m: float) -> tuple[int, float]:
-    """Cell index and place in it (0 to 1) of a range; ranges outside the grid are clamped to its ends."""
+    """Return the cell index and place in it (0 to 1) of a range; ranges outside the grid are clamped to its ends."""
     last = int(axes[N_RHO]) - 1
     half = axes[RHO_STEP] - 0.5 * axes[RHO_GROWTH]
     above = rho_m - axes[RHO_FIRST]
@@ -42,7 +42,7 @@ def rho_place(axes: Array, rho_m: float) -> tuple[int, float]:
 
 @kernel
 def even_place(value: float, n_cells: int) -> tuple[int, float]:
-    """Cell index and place of a value counted in cells, clamped to 0 .. n_cells."""
+    """Return the cell index and place of a value counted in cells, clamped to 0 .. n_cells."""
     if not value > 0.0:
         return 0, 0.0
     if value >= n_cells:
@@ -62,7 +62,7 @@ def blend(
     own: tuple[int, float],
     other: tuple[int, float],
 ) -> float:
-    """Multilinear interpolation between the corners of one cell; corners of no weight are not read."""
+    """Interpolate multilinearly between the corners of a cell; corners of zero weight are not read."""
     n_psi, n_beta, n_own, n_other = int(axes[N_PSI]), int(axes[N_BETA]), int(axes[N_OWN]), int(axes[N_OTHER])
     start = offset + own[0] * n_other + other[0]
     block = n_own * n_other
@@ -88,7 +88,7 @@ def blend(
 
 @kernel
 def _speeds(data: NDArray[Any], at: int, n_other: int, own: float, other: float) -> float:
-    """Interpolation over the two speeds at one corner of position and heading."""
+    """Interpolate over the two speeds at one corner of position and heading."""
     low = float(data[at])
     if other != 0.0:
         low += other * (float(data[at + 1]) - low)
@@ -105,8 +105,8 @@ def _speeds(data: NDArray[Any], at: int, n_other: int, own: float, other: float)
 class Grid:
     """Nodes of a value table.
 
-    Order of the values: (range, relative heading, bearing, own speed, other's speed), row-major. Relative heading
-    is periodic from 0; bearing covers 0 to 180 deg, the other side is its mirror image; speeds start at 0.
+    Order of the values: (range, relative heading, bearing, own speed, other's speed), row-major. Relative heading is
+    periodic from 0. Bearing covers 0 to 180 deg; the other side is its mirror image. Speeds start at 0.
 
     Raises:
         TableError: too few nodes, or ranges or speeds out of order.
@@ -120,9 +120,9 @@ class Grid:
     n_other: int
     own_top_mps: float  # the highest speeds, m/s
     other_top_mps: float
-    rho_first_m: float = 1.0  # smallest range, m; nearer than that the value is the range itself
+    rho_first_m: float = 1.0  # smallest range, m; nearer, the value is the range itself
     rho_ratio: float = 5.0  # spacing of the farthest ranges over that of the nearest
-    cap_m: float = 6.0  # values above this are not told apart, m
+    cap_m: float = 6.0  # largest value, m; higher ones are cut to it
 
     def __post_init__(self) -> None:
         if min(self.n_rho, self.n_psi, self.n_beta, self.n_own, self.n_other) < 2:
@@ -156,7 +156,7 @@ class Grid:
         return math.pi / (self.n_beta - 1)
 
     def pack(self) -> Array:
-        """Description for compiled code, shape ``(N_AXES,)``."""
+        """Return the description for compiled code, shape ``(N_AXES,)``."""
         gaps = self.n_rho - 1
         mean = (self.rho_last_m - self.rho_first_m) / gaps
         step = 2.0 * mean / (1.0 + self.rho_ratio)
@@ -165,14 +165,14 @@ class Grid:
         return np.array([self.rho_first_m, step, growth, *sizes, self.own_top_mps, self.other_top_mps, self.cap_m])
 
     def ranges_m(self) -> Array:
-        """Ranges of the nodes, m, shape ``(n_rho,)``."""
+        """Return the ranges of the nodes, m, shape ``(n_rho,)``."""
         axes = self.pack()
         return np.array([rho_node(axes, i) for i in range(self.n_rho)])
 
     def own_speeds_mps(self) -> Array:
-        """Own speeds of the nodes, m/s."""
+        """Return the own speeds of the nodes, m/s."""
         return np.linspace(0.0, self.own_top_mps, self.n_own)
 
     def other_speeds_mps(self) -> Array:
-        """The other's speeds of the nodes, m/s."""
+        """Return the other's speeds of the nodes, m/s."""
         return np.linspace(0.0, self.other_top_mps, self.n_other)

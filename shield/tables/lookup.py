@@ -1,4 +1,4 @@
-"""Looking a value up, compiled: distance two boats can be kept apart, and its gradient."""
+"""Compiled lookup of a value: the distance that two boats can keep, and its gradient."""
 
 from __future__ import annotations
 
@@ -29,24 +29,26 @@ from .grid import (
 )
 
 STEPS = 255
-"""Values are kept as whole steps of cap / 255, rounded down."""
+"""Values are stored as whole steps of cap / 255, rounded down."""
 
 LEVELS_S = (3.0, 6.0, 9.0, 12.0, 20.0)
-"""Times T for which a table keeps V(x, T), the distance that can be kept from an other that does its worst for T,
-besides that for the whole play; in between it is interpolated. V(x, 0) is the distance itself."""
+"""Times T for which a table stores V(x, T), besides the whole play; in between it is interpolated.
+
+V(x, T) is the distance that can be kept from another boat that does its worst for T. V(x, 0) is the distance itself.
+"""
 WHOLE_S = 90.0
-"""Time from which on the whole play counts, s."""
+"""Time from which on the value of the whole play applies."""
 N_LEVELS = len(LEVELS_S) + 1
-"""Values kept of each place: at `LEVELS_S`, and for the whole play."""
+"""Values stored for each place: at `LEVELS_S`, and for the whole play."""
 
 
 class Tables(NamedTuple):
-    """Several value tables behind one another, for compiled code."""
+    """Several concatenated value tables, for compiled code."""
 
     data: NDArray[np.uint8]  # all values, uint8, in steps of cap / 255
-    level: IntArray  # where each table's levels begin, the last for the whole play, shape ``(n_tables, N_LEVELS)``
+    level: IntArray  # start of each table's levels, the last for the whole play, shape ``(n_tables, N_LEVELS)``
     axes: Array  # each table's grid, shape ``(n_tables, N_AXES)``
-    full_m: Array  # range from which on a level, and all before it, hold nothing but the cap, as ``level``
+    full_m: Array  # range from which a level and all before it hold only the cap; shape as ``level``
 
 
 class Gradient(NamedTuple):
@@ -65,21 +67,21 @@ class Gradient(NamedTuple):
 
 
 def no_tables() -> Tables:
-    """An empty set, for code that takes tables but has none."""
+    """Return an empty set, for code that takes tables but has none."""
     return Tables(
         np.zeros(0, np.uint8), np.zeros((0, N_LEVELS), np.int64), np.zeros((0, N_AXES)), np.zeros((0, N_LEVELS))
     )
 
 
 def pack(values_m: NDArray[Any], cap_m: float) -> NDArray[np.uint8]:
-    """Values in m as whole steps of cap / 255, rounded down."""
+    """Return values in m as whole steps of cap / 255, rounded down."""
     steps = np.floor(values_m.astype(np.float64) * (STEPS / cap_m) + 1e-6)
     return np.clip(steps, 0, STEPS).astype(np.uint8)
 
 
 @lean_kernel
 def table_range_m(tables: Tables, table: int) -> float:
-    """Largest range of a table, m; farther boats are looked up as if they were there."""
+    """Return the largest range of a table, m; farther boats are looked up as if they were there."""
     axes = tables.axes[table]
     return rho_node(axes, int(axes[N_RHO]) - 1)
 
@@ -96,7 +98,7 @@ def _speed_places(axes: Array, own_mps: float, other_mps: float) -> tuple[tuple[
 def _angle_places(
     axes: Array, bearing_rad: float, own_rad: float, other_rad: float
 ) -> tuple[tuple[int, float], tuple[int, float], float]:
-    """Places of relative heading and bearing, and the side: 1 starboard, -1 port (mirrored)."""
+    """Return places of relative heading and bearing, and the side: 1 starboard, -1 port (mirrored)."""
     half_turns = (bearing_rad - own_rad) / math.pi
     half_turns -= 2.0 * math.floor(0.5 * half_turns + 0.5)
     side = 1.0
@@ -109,7 +111,7 @@ def _angle_places(
 
 @lean_kernel
 def _level_of(tables: Tables, table: int, horizon_s: float) -> tuple[int, float]:
-    """The level below a time T, -1 for the distance itself, and the share of the way to the next one."""
+    """Return the level below a time T (-1: the distance itself) and the share of the way to the next one."""
     level = tables.level[table]
     if horizon_s >= WHOLE_S or level[0] == level[N_LEVELS - 1]:
         return N_LEVELS - 1, 0.0
@@ -123,7 +125,7 @@ def _level_of(tables: Tables, table: int, horizon_s: float) -> tuple[int, float]
 
 @lean_kernel
 def full_from_m(tables: Tables, table: int, horizon_s: float) -> float:
-    """Range, m, from which on a table tells nothing but its cap for a time T."""
+    """Return the range, m, from which on all values of a table for a time T equal its cap."""
     low, part = _level_of(tables, table, horizon_s)
     return tables.full_m[table, low + 1 if part > 0.0 else max(0, low)]
 
@@ -140,10 +142,11 @@ def table_value(
     own_speed_mps: float,
     other_speed_mps: float,
 ) -> float:
-    """Distance, m, that the own boat can keep from now on, at most the cap; NaN when an input is not finite.
+    """Return the distance, m, that the own boat can keep from now on, at most the cap; NaN if an input is not finite.
 
-    The other does its worst for a time T, ``horizon_s``, from `WHOLE_S` on the whole play; between levels interpolated.
-    Positions are the other's minus the own, headings clockwise from north, speeds clamped to the table's.
+    The other boat does its worst for ``horizon_s``; from `WHOLE_S` on this means the whole play. Between levels the
+    value is interpolated. Positions are the other's minus the own, headings clockwise from north. Speeds are clamped to
+    the table's.
     """
     if not math.isfinite(dx_m + dy_m + own_heading_rad + other_heading_rad + own_speed_mps + other_speed_mps):
         return math.nan
@@ -179,9 +182,9 @@ def table_gradient(
     own_speed_mps: float,
     other_speed_mps: float,
 ) -> Gradient:
-    """Value and derivatives, exact for the interpolated value; arguments as of `table_value`.
+    """Return value and derivatives, exact for the interpolated value; arguments as for `table_value`.
 
-    Where an input is clamped the derivative with respect to it is 0; on a cell's edge it is that of one side.
+    The derivative with respect to a clamped input is 0. On a cell's edge the derivative is that of one side.
     """
     total = dx_m + dy_m + own_heading_rad + other_heading_rad + own_speed_mps + other_speed_mps
     if not math.isfinite(total):
@@ -219,7 +222,7 @@ def table_gradient(
 
 @lean_kernel
 def _slope_of_distance(cap_m: float, dx_m: float, dy_m: float, rho: float) -> Gradient:
-    """Value and derivatives of min(distance, cap)."""
+    """Return value and derivatives of min(distance, cap)."""
     if rho > cap_m:
         return Gradient(cap_m, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     scale = 1.0 / max(rho, 1e-9)
@@ -238,7 +241,7 @@ def _slope_of_level(
     own_speed_mps: float,
     other_speed_mps: float,
 ) -> Gradient:
-    """`table_gradient` of the level that begins ``at`` there in the data, beyond the first range."""
+    """Return the gradient for the level that begins at ``at`` in the data, beyond the first range."""
     axes = tables.axes[table]
     rho = math.sqrt(dx_m * dx_m + dy_m * dy_m)
     psi, beta, side = _angle_places(axes, math.atan2(dx_m, dy_m), own_heading_rad, other_heading_rad)
@@ -284,7 +287,7 @@ def _slope_of_level(
 
 @lean_kernel
 def _clamped(speed_mps: float, top_mps: float) -> float:
-    """1 within the speed axis, 0 outside it."""
+    """Return 1 within the speed axis, 0 outside it."""
     if speed_mps < 0.0 or speed_mps > top_mps:
         return 0.0
     return 1.0

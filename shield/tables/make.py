@@ -1,4 +1,4 @@
-"""From a problem to a table with a complete card: solve, solve coarser, compare, run the full model."""
+"""From a problem to a table with a complete card: solve, solve on a coarser grid, compare, run the full model."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from .settings import Problem
 from .solve import Notice, solve
 
 RADII_M = (2.5, 4.0)
-"""Separation radii for which tables are checked unless others are asked for, m."""
+"""Separation radii for which tables are checked by default."""
 COARSER = 1.5
-"""Factor on all spacings of the grid that a table is compared with."""
+"""Factor on all spacings of the grid for the comparison."""
 RUNS = 1000
 
 Stage = Callable[[str], Notice]
@@ -42,9 +42,9 @@ def make_table(
         problem: what to solve.
         radii_m: separation radii to check convergence and margin for, m.
         threads: threads to use; by default all cores.
-        checkpoint: file that keeps the solve until the table is complete; an interrupted one goes on from there.
+        checkpoint: file with the state of the solve until the table is complete; an interrupted solve resumes from it.
         runs: closed-loop runs of the full model per radius.
-        stage: called with the name of each part; returns what to call with its progress.
+        stage: called with the name of each part; returns a function to call with its progress.
 
     Raises:
         TableError: a radius is outside the table, or the checkpoint belongs to another problem.
@@ -64,12 +64,12 @@ def make_table(
 
 
 def _second(checkpoint: Path | None) -> Path | None:
-    """Where the solve on the coarser grid is kept."""
+    """Return the checkpoint of the solve on the coarser grid."""
     return None if checkpoint is None else checkpoint.with_name(checkpoint.name + ".coarser")
 
 
 def check_radii(problem: Problem, radii_m: tuple[float, ...]) -> None:
-    """Raise a `TableError` unless the radii lie well inside the table's values."""
+    """Raise a `TableError` unless the radii are well inside the table's values."""
     low, high = problem.grid.rho_first_m, 0.8 * problem.grid.cap_m
     for radius in radii_m:
         if not low < radius <= high:
@@ -77,7 +77,7 @@ def check_radii(problem: Problem, radii_m: tuple[float, ...]) -> None:
 
 
 def coarser(problem: Problem, factor: float) -> Problem:
-    """The same problem with all spacings of the grid wider by a factor (speeds keep at least 3 nodes)."""
+    """Return the same problem with all grid spacings wider by a factor (speeds have at least 3 nodes)."""
     grid = problem.grid
     fewer = {
         name: max(3, 1 + round((getattr(grid, name) - 1) / factor)) for name in ("n_rho", "n_beta", "n_own", "n_other")
@@ -93,7 +93,7 @@ def figures(
     notice: Notice,
     boats: tuple[Platform, Platform] | None = None,
 ) -> dict[str, Any]:
-    """What a card says about a table: convergence, areas, model error and margin; ``boats`` that have no name here."""
+    """Return the figures of a card: convergence, areas, model error and margin; ``boats`` may be unregistered."""
     own, other = boats or (get_platform(table.card.own), get_platform(table.card.other))
     margins = {}
     for done, radius in enumerate(radii_m):
@@ -112,14 +112,14 @@ def figures(
 
 
 def reaches(table: ValueTable, radii_m: tuple[float, ...]) -> dict[str, float]:
-    """How far ahead the set reaches head-on at top speeds, m, by radius."""
+    """Return how far ahead the set extends head-on at top speeds, m, by radius."""
     grid = table.card.make_grid()
     tops = grid.own_top_mps, grid.other_top_mps
     return {f"{radius:g}": round(reach_ahead_m(table, radius, 180.0, *tops), 2) for radius in radii_m}
 
 
 def level_reaches(table: ValueTable, radii_m: tuple[float, ...]) -> dict[str, dict[str, float]]:
-    """`reaches` at each shorter time that the table keeps, by time in s."""
+    """Return `reaches` at each shorter time that the table stores, by time in s."""
     return {
         f"{time_s:g}": reaches(replace(table, values=values), radii_m)
         for time_s, values in zip(table.card.levels_s, table.levels, strict=True)
@@ -127,7 +127,7 @@ def level_reaches(table: ValueTable, radii_m: tuple[float, ...]) -> dict[str, di
 
 
 def convergence(table: ValueTable, coarse: ValueTable, radius_m: float) -> dict[str, float]:
-    """Change of the sets' areas from a coarser grid, shares of the finer: mean and largest over headings and speeds."""
+    """Return the change of the sets' areas on a coarser grid, as shares: mean and largest over headings and speeds."""
     grid, changes = table.card.make_grid(), []
     for own, other in SPEED_SHARES:
         for heading in HEADINGS_DEG:

@@ -1,4 +1,4 @@
-"""Figures for a table's card: error of the reduced model, and the loss of value in runs of the full model."""
+"""Figures for a table's card: error of the reduced model, and loss of value in runs of the full model."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ DRAWS_PER_RUN = 2000
 
 
 def full_thrust_state(platform: Platform, speed_mps: float, heading_deg: float = 0.0) -> Array:
-    """State row of a boat with its thrust at the maximum, at the origin."""
+    """Return the state row of a boat at maximum thrust, at the origin."""
     state = fresh_state(0.0, 0.0, heading_deg, speed_mps)
     state[L.THRUST] = platform.max_thrust
     state[L.SPEED_ERROR] = platform.max_speed_mps - speed_mps
@@ -36,10 +36,11 @@ def full_thrust_state(platform: Platform, speed_mps: float, heading_deg: float =
 
 
 def model_error(name: str | Platform, dt_s: float, runs: int, seed: int = 0) -> dict[str, float]:
-    """Error of the reduced model per table step over random closed-loop runs of the full one.
+    """Return the error of the reduced model per table step, over random closed-loop runs of the full model.
 
-    The full boat follows random heading commands at top speed through its autopilot; the reduced one is given
-    the mean rudder of the step. Reported: 99th percentile and largest error of place, m, heading, deg, speed, m/s.
+    The full boat follows random heading commands at top speed through its autopilot. The reduced one gets the mean
+    rudder of the step. Reported are the 99th percentile and the largest error of place, m, heading, deg, and speed,
+    m/s.
     """
     platform, random = get_platform(name), np.random.default_rng(seed)
     errors = np.array([_step_error(platform, dt_s, random) for _ in range(runs)])
@@ -84,14 +85,15 @@ def value_loss(
     seed: int = 0,
     boats: tuple[Platform, Platform] | None = None,
 ) -> dict[str, Any]:
-    """Runs of the full model from random states of value between the radius and `BAND_M` more.
+    """Run the full model from random states whose value is between the radius and `BAND_M` more.
 
-    The own boat always takes the rudder of the highest value, decided anew every 0.1 s; the other one plays
-    against it in each of `MANNERS` in turn (a cooperative table: both play the joint best).
+    The own boat always takes the rudder of the highest value, decided anew every 0.1 s. The other plays against it in
+    each of `MANNERS` in turn. With a cooperative table both play the joint optimum.
 
     Returns:
-        Runs, breaches (below the radius), the smallest extra value m from which no run breached (``margin_m``),
-        and how far below its first value a run came: median and largest (``loss_m``).
+        Number of runs, separation violations (below the radius), the smallest extra value, m, from which no run
+        violated the separation (``margin_m``), and how far below its first value a run came: median and largest
+        (``loss_m``).
     """
     card = table.card
     boats = boats or (get_platform(card.own), get_platform(card.other))
@@ -121,7 +123,7 @@ def value_loss(
 def _draw(
     tables: Tables, boats: tuple[Platform, Platform], radius_m: float, random: np.random.Generator
 ) -> tuple[Array, Array, float]:
-    """A pair of boats at full thrust whose value is in the band."""
+    """Draw a pair of boats at full thrust whose value is in the band."""
     axes = tables.axes[0]
     last = axes[0] + axes[1] * (axes[3] - 1) + 0.5 * axes[2] * (axes[3] - 1) * (axes[3] - 2)
     for _ in range(DRAWS_PER_RUN):

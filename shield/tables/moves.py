@@ -1,8 +1,8 @@
-"""The reduced model: the hull of the full model with its thrust held at the maximum, steered by the rudder.
+"""The reduced model: the hull of the full model at maximum thrust, steered by the rudder.
 
-A rudder change costs no time on these boats and thrust is at its limit whenever it matters, so what is left of
-the state is position, heading and the stored speed. The speed lost in a turn, the limits on gaining and losing
-it and the stored mean of old and new speed are those of `platforms.usv`, called here step by step.
+On these boats a rudder change takes no time, and thrust is at its limit whenever it matters. The remaining state is
+position, heading and stored speed. Loss of speed in a turn, limits on gaining and losing it, and the stored mean of old
+and new speed are those of `platforms.usv`, called here step by step.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from ..platforms.platform import Platform
 from ..platforms.usv import advance_hull
 
 SUB_STEP_S = 0.1
-"""Step of the full model, s; positions in between are kept so that no closest approach is stepped over."""
+"""Step of the full model; positions in between are stored so that no closest approach is missed."""
 
 
 @dataclass(frozen=True)
 class Moves:
-    """What one table step does to a boat, for each speed node and rudder.
+    """Effect of one table step on a boat, for each speed node and rudder.
 
     Frame: x to starboard, y ahead of the heading at the start; turns clockwise.
     """
@@ -36,7 +36,7 @@ class Moves:
 
 @kernel
 def run_hull(params: Array, state: Array, rudder: float, steps: int, dt_s: float, trail: Array) -> float:
-    """Run the hull with rudder and thrust held; fills ``trail`` (steps, 2); returns the turn, deg."""
+    """Run the hull with rudder and thrust held, fill ``trail`` (steps, 2) and return the turn, deg."""
     turned = 0.0
     state[L.THRUST] = params[L.MAX_THRUST]
     state[L.RUDDER] = rudder
@@ -55,7 +55,7 @@ def run_hull(params: Array, state: Array, rudder: float, steps: int, dt_s: float
 
 
 def sub_steps(dt_s: float) -> int:
-    """Sub-steps of a table step, which is a multiple of `SUB_STEP_S`."""
+    """Return the sub-steps of a table step, which must be a multiple of `SUB_STEP_S`."""
     count = round(dt_s / SUB_STEP_S)
     if count < 1 or abs(count * SUB_STEP_S - dt_s) > 1e-9:
         raise TableError(f"the step of a table is {dt_s:g} s; make it a multiple of {SUB_STEP_S:g} s")
@@ -63,7 +63,7 @@ def sub_steps(dt_s: float) -> int:
 
 
 def moves_of(platform: Platform, speeds_mps: Array, rudders: Array, dt_s: float) -> Moves:
-    """Moves of a platform from each speed with each rudder (share of full, -1 to 1) in one table step."""
+    """Return a platform's moves in one table step, from each speed with each rudder (share of full, -1 to 1)."""
     if platform.kind != "usv":
         raise TableError(
             f"platform {platform.name!r} is a {platform.kind}: value tables are for boats of kind 'usv'; "

@@ -1,4 +1,4 @@
-"""What a value table is solved for: which boats, which rules of the game, which grid."""
+"""What a value table is solved for: boats, what the other boat may do, grid."""
 
 from __future__ import annotations
 
@@ -17,31 +17,33 @@ from .grid import Grid
 from .moves import moves_of, sub_steps
 
 FAR_M = 30.0
-"""Tables that go farther than this get fewer ranges, the nearest of them closer together."""
+"""Range beyond which tables have fewer ranges, with closer spacing of the nearest."""
 LONGEST_CHASE_S = 30.0
-"""Longest play that is fitted against a faster boat: over longer ones it catches the most agile one from anywhere (the
-homicidal chauffeur), and a table that says so is of no use."""
+"""Longest fitted play against a faster boat. Over longer ones it catches the most agile boat from anywhere (the
+homicidal chauffeur), and the table would be useless.
+"""
 LONGEST_S = 90.0
-"""Longest play that is fitted against others. Who has lost its speed is chased for as long as it takes to win it back,
-and a table that ends sooner promises what is lost just beyond its end."""
+"""Longest fitted play against other boats. A boat that has lost speed can be chased until it has regained it; a shorter
+table would promise separations that are lost just after its end.
+"""
 SPEED_NODES = 5
 """Nodes along each axis of speed."""
 RUDDERS = (-1.0, -0.5, 0.0, 0.5, 1.0)
-"""Rudders both boats choose among, shares of full."""
+"""Rudders that both boats choose among, shares of full."""
 
 
 class OtherMay(StrEnum):
-    """What the other boat is granted."""
+    """What the other boat may do."""
 
     WORST_CASE = "worst-case"
     """It answers each own move with the worst one, knowing it."""
     COOPERATIVE = "cooperative"
-    """It helps: both boats make the best of it together."""
+    """It helps: both boats choose the joint optimum."""
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One pairwise game, ready to be solved.
+    """A game of two boats, ready to be solved.
 
     Raises:
         TableError: a setting is out of range.
@@ -49,10 +51,10 @@ class Problem:
 
     own: Platform  # the boats
     other: Platform
-    other_may: OtherMay  # what the other boat is granted
+    other_may: OtherMay  # what the other boat may do
     grid: Grid  # nodes of the table
-    dt_s: float  # table step, s: rudders are held for so long
-    horizon_s: float  # play looked ahead at most, s
+    dt_s: float  # table step, s, during which rudders are held
+    horizon_s: float  # longest play, s
 
     def __post_init__(self) -> None:
         sub_steps(self.dt_s)
@@ -66,12 +68,12 @@ class Problem:
 
 
 def table_name(own: str, other: str, other_may: OtherMay) -> str:
-    """Name of the table of a pair, as used for files."""
+    """Return the name of the table of a pair, as used for files."""
     return f"{own}-{other}-{other_may.value}"
 
 
 def read_other_may(text: str | OtherMay) -> OtherMay:
-    """The mode of that name."""
+    """Return the mode of that name."""
     try:
         return OtherMay(text)
     except ValueError:
@@ -87,16 +89,16 @@ def problem_of(
     dt_s: float | None = None,
     horizon_s: float | None = None,
 ) -> Problem:
-    """The problem of a pair with a grid fitted to its boats.
+    """Return the problem of a pair, with a grid fitted to its boats.
 
-    A step is about as long as a turn of 24 deg takes (between unlike boats, the geometric mean); headings are
-    spaced by whole parts of the full turns of a step and bearings by half of that, so that common moves
-    land on nodes and cause no blur; ranges go as far as the boats close in a half turn of the slower turner.
+    A step is about as long as a turn of 24 deg (for unlike boats the geometric mean). Headings are spaced by a fraction
+    1/k of a full-rudder turn in one step, and bearings by half of that. Common moves therefore end on nodes and cause
+    no blur. Ranges go as far as the boats close in a half turn of the slower turner.
 
     Args:
         own: platform of the own boat, or its name.
         other: platform of the other boat, or its name.
-        other_may: what the other boat is granted.
+        other_may: what the other boat may do.
         dt_s: step, s, instead of the fitted one.
         horizon_s: longest play, s, instead of the fitted one.
 
@@ -136,13 +138,13 @@ def _fitted_spacing_deg(boats: tuple[Platform, Platform], dt_s: float) -> float:
 
 
 def _full_turn_deg(boat: Platform, dt_s: float) -> float:
-    """Turn of one step at top speed and full rudder, deg."""
+    """Return the turn of one step at top speed and full rudder, deg."""
     moves = moves_of(boat, np.array([boat.max_speed_mps]), np.ones(1), dt_s)
     return math.degrees(abs(moves.turn_rad[0, 0]))
 
 
 def _fitted_horizon(boats: tuple[Platform, Platform]) -> float:
-    """Several half turns, and against a boat that is not faster the return to top speed as well, s."""
+    """Return the time of several half turns, s; against a boat that is not faster, plus that of regaining top speed."""
     own, other = limits_of(boats[0]), limits_of(boats[1])
     turns_s = 7.0 * max(own.half_turn_s, other.half_turn_s)
     if boats[1].max_speed_mps > boats[0].max_speed_mps:
@@ -151,7 +153,7 @@ def _fitted_horizon(boats: tuple[Platform, Platform]) -> float:
 
 
 def places(speeds_mps: Array, top_mps: float, n_nodes: int) -> Array:
-    """Cell and place in it of stored speeds on an even speed axis, shape ``(*speeds, 2)``."""
+    """Return cell and place in it of stored speeds on an even speed axis, shape ``(*speeds, 2)``."""
     cells = np.clip(speeds_mps / top_mps, 0.0, 1.0) * (n_nodes - 1)
     low = np.minimum(np.floor(cells + 1e-9), n_nodes - 2)
     place = np.clip(cells - low, 0.0, 1.0)

@@ -1,4 +1,4 @@
-"""Solving a value table: value iteration from V = min(range, cap) down, over threads, with checkpoints."""
+"""Solver of a value table: value iteration from V = min(range, cap) down, on several threads, with checkpoints."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from .settings import RUDDERS, OtherMay, Problem, places
 from .sweep import Pursuit, Ways, sweep, widen
 
 TOLERANCE_M = 5e-4
-"""Smaller changes of a value within one step are left out."""
+"""Smaller changes of a value within one step are ignored."""
 CONVERGED_M = 5e-3
-"""A solve ends when no value changed more than this in a step."""
+"""A solve ends when no value has changed by more than this in a step."""
 SAVE_EVERY = 20
 """Steps between two checkpoints."""
 
@@ -33,19 +33,19 @@ Notice = Callable[[int, int, float], None]
 
 @dataclass
 class Progress:
-    """A solve under way: what a checkpoint keeps."""
+    """State of a running solve, as saved in a checkpoint."""
 
     values: NDArray[np.float32]  # flat values, m, float32
-    hints: NDArray[np.uint8]  # best rudders of each cell (own * 8 + other), uint8
+    hints: NDArray[np.uint8]  # best rudders of each cell (own * 8 + other)
     active: BoolArray  # places (range, relative heading, bearing) that may still change
     iterations: int = 0  # steps done
-    residual_m: float = float("inf")  # largest change of the last step, m
+    residual_m: float = float("inf")  # largest change in the last step, m
     # packed values at each of `LEVELS_S` passed so far, uint8, ``(passed, size)``
     levels: NDArray[np.uint8] = field(default_factory=lambda: np.zeros((0, 0), np.uint8))
 
 
 def start(problem: Problem) -> Progress:
-    """Values before any play: the distance itself, capped."""
+    """Return the values before any play: the distance itself, capped."""
     grid = problem.grid
     ranges = np.minimum(grid.ranges_m(), grid.cap_m).astype(np.float32)
     values = np.repeat(ranges, grid.size // grid.n_rho)
@@ -54,7 +54,7 @@ def start(problem: Problem) -> Progress:
 
 
 def steps_of(problem: Problem) -> int:
-    """Steps to the horizon."""
+    """Return the number of steps to the horizon."""
     return max(1, round(problem.horizon_s / problem.dt_s))
 
 
@@ -67,16 +67,16 @@ def solve(
 ) -> Progress:
     """Solve the game by value iteration.
 
-    V starts at min(range, cap) and is lowered to max over own rudders, min over the other's (max over both when
-    it cooperates), of min(closest distance in the step, V after it), until nothing changes or the horizon is
-    reached. The result does not depend on the number of threads.
+    V starts at min(range, cap). Each iteration lowers it to the max over own rudders of the min over the other's (max
+    over both if it cooperates) of min(closest distance in the step, V after it). The iteration ends when nothing
+    changes or the horizon is reached. The result does not depend on the number of threads.
 
     Args:
         problem: boats, mode, grid, step and horizon.
         threads: threads to use; by default all cores.
         notice: called with (steps done, steps at most, largest change in m) after each step.
-        checkpoint: file that keeps the state, written now and then, when interrupted (Ctrl-C) and at the end.
-            When it exists and belongs to the same problem, the solve goes on from it.
+        checkpoint: file for the state, written every `SAVE_EVERY` steps, on interruption (Ctrl-C) and at the end. If it
+            exists and belongs to the same problem, the solve resumes from it.
 
     Raises:
         TableError: the checkpoint is damaged, belongs to another problem or cannot be written.
@@ -99,7 +99,7 @@ def solve(
 
 
 def _keep_level(problem: Problem, state: Progress) -> None:
-    """Keep V(x, T) when the iteration passes a time T that tables keep."""
+    """Store V(x, T) when the iteration reaches one of the times T of `LEVELS_S`."""
     passed = len(state.levels)
     if passed < len(LEVELS_S) and state.iterations == round(LEVELS_S[passed] / problem.dt_s):
         kept = state.levels.reshape(passed, problem.grid.size)
@@ -107,7 +107,7 @@ def _keep_level(problem: Problem, state: Progress) -> None:
 
 
 class _Solver:
-    """The arrays of a problem that stay the same from step to step."""
+    """The arrays of a problem that do not change from step to step."""
 
     def __init__(self, problem: Problem) -> None:
         grid = problem.grid
@@ -128,7 +128,7 @@ class _Solver:
         self.turns_rad = (own_turn, own_turn + float(np.abs(other.turn_rad).max()))
 
     def step(self, state: Progress, pool: ThreadPoolExecutor) -> None:
-        """One value iteration; the state changes only when it is complete."""
+        """Do one value iteration; the state changes only when it is complete."""
         values, changed = state.values.copy(), np.zeros_like(state.active)
 
         def piece(row: int) -> float:
@@ -152,7 +152,7 @@ def _keep(problem: Problem, state: Progress, path: Path) -> None:
 
 
 def write_whole(path: Path, content: bytes, what: str, remedy: str) -> None:
-    """Write a file so that no half-written one is ever found under its name."""
+    """Write a file so that no partial one ever exists under its name."""
     part = path.with_name(path.name + ".part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

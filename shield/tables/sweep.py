@@ -1,4 +1,4 @@
-"""Value iteration of one range of a grid, and which places can change next, compiled."""
+"""Compiled value iteration of one range of a grid, and the places that can change next."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from .grid import N_BETA, N_OTHER, N_OWN, N_PSI, blend, even_place, rho_node, rh
 
 TWO_PI = 2.0 * math.pi
 SNAP = 1e-7
-"""Places this near a node are put on it (a share of a cell): turns that fit the grid then cause no blur."""
+"""Places this near to a node (share of a cell) are moved onto it, so that turns that fit the grid cause no blur."""
 
 
 class Ways(NamedTuple):
-    """What one table step does to a boat: `moves.Moves`, with speeds as the grid has them."""
+    """Effect of one table step on a boat: `moves.Moves`, with speeds as places on the grid."""
 
     place_m: Array  # `Moves.place_m`
     turn_rad: Array  # `Moves.turn_rad`
@@ -30,12 +30,12 @@ class Pursuit(NamedTuple):
     axes: Array  # description of the grid
     own: Ways  # moves of the own boat
     other: Ways  # moves of the other boat
-    cooperative: bool  # whether the other boat helps
-    reach_m: float  # how far the two boats together can move in one step, m
+    cooperative: bool  # the other boat helps
+    reach_m: float  # how far both boats together can move in one step, m
 
 
 class Move(NamedTuple):
-    """One move of a boat: its trail (sub_steps, 2), m, its turn, rad, and the speed cell and place in it after it."""
+    """One move of a boat: its trail (sub_steps, 2), m, its turn, rad, and the speed cell and place in it afterwards."""
 
     trail_m: Array
     turn_rad: float
@@ -44,14 +44,14 @@ class Move(NamedTuple):
 
 @kernel
 def move_of(ways: Ways, speed: int, rudder: int) -> Move:
-    """The move from a speed node with a rudder."""
+    """Return the move from a speed node with a rudder."""
     after = ways.speed[speed, rudder]
     return Move(ways.place_m[speed, rudder], ways.turn_rad[speed, rudder], (int(after[0]), after[1]))
 
 
 @kernel
 def snapped(place: tuple[int, float]) -> tuple[int, float]:
-    """The place, moved onto a node when within rounding of it."""
+    """Return the place, moved onto a node if within rounding of it."""
     if place[1] < SNAP:
         return place[0], 0.0
     if place[1] > 1.0 - SNAP:
@@ -70,7 +70,7 @@ def value_at(
     own: tuple[int, float],
     other: tuple[int, float],
 ) -> float:
-    """Interpolated value; angles in any turn; bearings to port are mirrored."""
+    """Return the interpolated value; angles may be of any turn; bearings to port are mirrored."""
     if rho_m < axes[0]:
         return rho_m
     beta_rad -= TWO_PI * math.floor(beta_rad / TWO_PI + 0.5)
@@ -86,7 +86,7 @@ def value_at(
 
 @kernel
 def nearest(x0: float, y0: float, x1: float, y1: float) -> float:
-    """Squared distance of the segment from (x0, y0) to (x1, y1) to the origin."""
+    """Return the squared distance of the segment from (x0, y0) to (x1, y1) to the origin."""
     dx, dy = x1 - x0, y1 - y0
     length = dx * dx + dy * dy
     t = 0.0
@@ -98,7 +98,7 @@ def nearest(x0: float, y0: float, x1: float, y1: float) -> float:
 
 @kernel
 def closest(x: float, y: float, sin: float, cos: float, own: Array, other: Array) -> float:
-    """Closest distance within a step; sin and cos of the relative heading; trails of `moves`, both (sub_steps, 2)."""
+    """Return the closest distance within a step, for the relative heading and trails of `moves`, (sub_steps, 2)."""
     best = x * x + y * y
     x0, y0 = x, y
     for k in range(own.shape[0]):
@@ -113,7 +113,7 @@ def closest(x: float, y: float, sin: float, cos: float, own: Array, other: Array
 def outcome(
     values: NDArray[Any], game: Pursuit, x: float, y: float, psi: float, sin: float, cos: float, own: Move, other: Move
 ) -> float:
-    """Value after one step of one pair of moves: the smaller of what came in between and what is to come."""
+    """Return the value after one step of a pair of moves: the closest distance in it or the later value, if smaller."""
     own_place, other_place = own.trail_m, other.trail_m
     last = own_place.shape[0] - 1
     x1 = x + other_place[last, 0] * cos + other_place[last, 1] * sin - own_place[last, 0]
@@ -130,9 +130,9 @@ def outcome(
 def cell_value(
     values: NDArray[Any], game: Pursuit, x: float, y: float, psi: float, a: int, b: int, old: float, hint: int
 ) -> tuple[float, int]:
-    """Best the own boat can get from here, no higher than ``old``, and the rudders (own * 8 + other) of it.
+    """Return the best value the own boat can get, at most ``old``, and its rudders (own * 8 + other).
 
-    The own rudder of the hint is tried first, and of the other's answers the one that hurt last.
+    For speed the own rudder of the hint is tried first, and first of the other's answers the one that was worst last.
     """
     sin, cos = math.sin(psi), math.cos(psi)
     n_own, n_other, cooperative = game.own.turn_rad.shape[1], game.other.turn_rad.shape[1], game.cooperative
@@ -177,10 +177,11 @@ def sweep(
     tolerance_m: float,
     row: int,
 ) -> float:
-    """Value iteration of a range: reads ``values``, lowers ``out``, a copy of them; returns the largest change, m.
+    """Do the value iteration of one range and return the largest change, m.
 
-    Places that are not ``active`` are skipped, those that change are set in ``changed``; smaller changes than the
-    tolerance are left out. ``hints`` are the best rudders of each cell, kept from one iteration to the next.
+    It reads ``values`` and lowers ``out``, a copy of them. Places that are not ``active`` are skipped. Places that
+    change are set in ``changed``. Changes up to the tolerance are ignored. ``hints`` are the best rudders of each cell,
+    carried over from one iteration to the next.
     """
     axes = game.axes
     n_psi, n_beta = int(axes[N_PSI]), int(axes[N_BETA])
@@ -209,9 +210,10 @@ def sweep(
 
 @kernel
 def widen(changed: BoolArray, axes: Array, reach_m: float, own_turn_rad: float, psi_turn_rad: float) -> BoolArray:
-    """Places (range, relative heading, bearing) from which one step leads to a changed one, or its mirror image.
+    """Return places (range, relative heading, bearing) from which one step leads to a changed one or its mirror image.
 
-    In a step the boats together move ``reach_m``, the own boat and the relative heading turn by so many rad.
+    In a step the boats together move ``reach_m``; the own boat turns by ``own_turn_rad``, the relative heading by
+    ``psi_turn_rad``.
     """
     n_rho, n_psi, n_beta = changed.shape
     near = _over_headings(_over_ranges(changed, axes, reach_m), psi_turn_rad)
