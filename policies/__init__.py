@@ -1,7 +1,7 @@
-"""Team policies: the organisers' opponents and other scripted ones, competition submissions, any of the user's own.
+"""Team policies: the organisers' opponents and other scripted ones, competition submissions, and the user's own.
 
-``make("medium")`` builds one by name, ``make("path/to/submission.zip")`` from a file; `from_agents` and `from_callable`
-take objects and functions. `make_batch` builds the scripted ones for a `BatchedMctf`.
+``make("medium")`` builds one by name, ``make("path/to/submission.zip")`` from a file. `from_agents` and `from_callable`
+accept objects and functions. `make_batch` builds policies for a `BatchedMctf`.
 """
 
 from .actions import HOLD, ActionReader, to_command

@@ -1,4 +1,4 @@
-"""What a team of somebody's own code relies on of its game, whoever plays that, and the checks of its answers."""
+"""What foreign code may rely on in its game, whoever plays the game, and checks of its answers."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from steerclear.shield.wrappers.actions import short
 from steerclear.shield.wrappers.readers import reader_of
 
 HOLD = (0.0, 0.0)
-"""Action of a boat that gave no usable answer: speed 0, heading as it is."""
+"""Action of a boat without a usable answer: speed 0, heading unchanged."""
 MAX_SPEED_FACTOR = 10.0
-"""A speed beyond this many times the boat's top speed is taken for an error, not for a wish to be clipped."""
+"""A speed beyond this multiple of the boat's top speed counts as an error and is not clipped."""
 MAX_HEADING_DEG = 360.0
-"""A relative heading beyond this is taken for an error."""
+"""A larger relative heading counts as an error."""
 Fault = tuple[str, str]
-"""What is wrong with an answer: kind, explanation."""
+"""A fault of an answer: kind, explanation."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class SeenGame:
         agent_radius_m: (n,) radius of each, m.
         decision_s: time from decision to decision, s.
         n_obs: length of an observation; 0: they are no arrays.
-        commands: (n, 2) speed m/s and relative heading deg of actions by boat, as the game plays them.
+        commands: returns (n, 2) speed m/s and relative heading deg for actions by boat, as the game plays them.
     """
 
     agent_ids: tuple[str, ...]
@@ -65,10 +65,10 @@ class SeenGame:
 
 
 def seen_game(env: Any) -> SeenGame:
-    """The game that an environment, or a wrapper round one, plays.
+    """Return the game that an environment, or a wrapper around one, plays.
 
     Raises:
-        PolicyError: nobody reads it.
+        PolicyError: no `GameReader` reads it.
     """
     try:
         reader = reader_of(env)
@@ -93,10 +93,10 @@ class ActionReader:
     """Reads actions for the boats of one game.
 
     Args:
-        env: an `MctfEnv`, a Pyquaticus env, a wrapper round one, or the `SeenGame` of one.
+        env: an `MctfEnv`, a Pyquaticus env, a wrapper around one, or a `SeenGame`.
 
     Raises:
-        PolicyError: ``env`` is no such env.
+        PolicyError: ``env`` is none of these.
     """
 
     def __init__(self, env: Any) -> None:
@@ -104,10 +104,10 @@ class ActionReader:
         self._top_mps = self._game.top_speed_mps
 
     def command(self, agent_id: str, action: Any) -> tuple[float, float]:
-        """Speed m/s and relative heading deg an action asks for, from where the boat is now.
+        """Return speed m/s and relative heading deg of an action, for the boat's present place.
 
         Args:
-            agent_id: whose action it is.
+            agent_id: the acting boat.
             action: a whole number, a pair (speed m/s, relative heading deg) or the name of a field point.
 
         Raises:
@@ -120,13 +120,13 @@ class ActionReader:
         return float(row[0]), float(row[1])
 
     def problem(self, agent_id: str, action: Any) -> Fault | None:
-        """What is wrong with an action; None when it can be used."""
+        """Return the fault of an action; None if it is usable."""
         if action is None:
             return "no answer", "compute_action returned None; return an action"
         try:
             if not isinstance(action, (str, bytes)) and not np.isfinite(numbers(action)).all():
                 return "not finite", f"{short(action)} is not finite"
-        except NoNumbersError:  # none or too large ones: the game's decoder refuses those
+        except NoNumbersError:  # no or too large numbers: the game's decoder refuses those
             pass
         try:
             row = self._decode(agent_id, action)
@@ -144,10 +144,10 @@ class ActionReader:
 
 
 def to_command(env: Any, agent_id: str, action: Any) -> tuple[float, float]:
-    """One action as (speed m/s, relative heading deg); see `ActionReader.command`, which is quicker for many.
+    """Return one action as (speed m/s, relative heading deg). For many, `ActionReader.command` is faster.
 
     Raises:
-        PolicyError: nobody reads ``env``, the agent is unknown, or the action is unusable.
+        PolicyError: no reader for ``env``, an unknown agent, or an unusable action.
     """
     game = seen_game(env)
     if agent_id not in game.agent_ids:

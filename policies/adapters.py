@@ -1,4 +1,4 @@
-"""Policies made of the user's own objects: Pyquaticus-style agents, or any callable."""
+"""Policies from the user's own objects: Pyquaticus-style agents, or any callable."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ Function = Callable[[np.ndarray], Any]
 
 
 def call_fault(function: Callable[..., Any], arguments: Sequence[str]) -> str | None:
-    """Why a function cannot be called with so many arguments and answer at once; None when it can.
+    """Return why a function cannot be called with these arguments and answer at once; None if it can.
 
-    It is looked at before the game instead of in every step of it.
+    This check before the game replaces failures in every step of it.
 
     Args:
-        function: as it is called, bound.
+        function: as it will be called, bound.
         arguments: their names, for the text.
     """
     if inspect.iscoroutinefunction(function) or inspect.isgeneratorfunction(function):
@@ -31,7 +31,7 @@ def call_fault(function: Callable[..., Any], arguments: Sequence[str]) -> str | 
         return "is an asynchronous generator; return the action"
     try:
         signature = inspect.signature(function)
-    except Exception:  # built-in functions tell nothing; foreign ones may raise anything
+    except Exception:  # built-in functions have no signature; foreign ones may raise anything
         return None
     try:
         signature.bind(*arguments)
@@ -42,10 +42,10 @@ def call_fault(function: Callable[..., Any], arguments: Sequence[str]) -> str | 
 
 
 class AgentsCode(ForeignCode):
-    """Agents with ``compute_action(obs, info)``, given all observations and infos by agent id as Pyquaticus gives them.
+    """Agents with ``compute_action(obs, info)``, which receive all observations and infos by agent id as in Pyquaticus.
 
     Args:
-        agents: agents by id, or a factory called with (agent_id, env) when a game begins.
+        agents: agents by id, or a factory that is called with (agent_id, env) when a game begins.
     """
 
     def __init__(self, agents: Mapping[str, Any] | AgentFactory) -> None:
@@ -55,7 +55,7 @@ class AgentsCode(ForeignCode):
         self._agents: dict[str, Any] = {}
 
     def begin(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:
-        """Take (or make) the agents of this game."""
+        """Look up or build the agents of this game."""
         if isinstance(self._source, Mapping):
             _check_all(self._source, agent_ids, "no agent for", "agents are")
             self._agents = {agent_id: self._source[agent_id] for agent_id in agent_ids}
@@ -69,12 +69,12 @@ class AgentsCode(ForeignCode):
                 raise PolicyError(f"compute_action of agent {agent_id} ({type(agent).__name__}) {fault}")
 
     def prepare(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> Answer:
-        """Ask each boat's agent."""
+        """Return the answers of each boat's agent."""
         return lambda agent_id: self._agents[agent_id].compute_action(observations, infos)
 
 
 class CallableCode(ForeignCode):
-    """Functions of one boat's normalised observation, one for all boats or by agent id."""
+    """Functions of one boat's normalised observation: one for all boats, or one per agent id."""
 
     def __init__(self, functions: Function | Mapping[str, Function]) -> None:
         parts = list(functions.values()) if isinstance(functions, Mapping) else [functions]
@@ -92,7 +92,7 @@ class CallableCode(ForeignCode):
             _check_all(self._functions, agent_ids, "no function for", "there are")
 
     def prepare(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> Answer:
-        """Ask each boat's function."""
+        """Return the answers of each boat's function."""
         functions = self._functions
         if isinstance(functions, Mapping):
             return lambda agent_id: functions[agent_id](observations[agent_id])
@@ -106,11 +106,11 @@ def _check_all(given: Mapping[str, Any], agent_ids: Sequence[str], lacks: str, a
 
 
 def from_agents(agents: Mapping[str, Any] | AgentFactory, name: str = "agents") -> GuardedTeam:
-    """A team of Pyquaticus-style agents: objects with ``compute_action(obs, info)``.
+    """Build a team of Pyquaticus-style agents: objects with ``compute_action(obs, info)``.
 
     Args:
-        agents: {agent_id: agent}, or ``factory(agent_id, env)``, often the agents' class itself, called at each reset;
-            a dict serves only the env its agents were built with.
+        agents: {agent_id: agent}, or ``factory(agent_id, env)``, often the agents' class itself, called at each reset.
+            A dict serves only the env that its agents were built with.
         name: name for records and reports.
 
     Raises:
@@ -120,10 +120,11 @@ def from_agents(agents: Mapping[str, Any] | AgentFactory, name: str = "agents") 
 
 
 def from_callable(function: Function | Mapping[str, Function], name: str = "callable") -> GuardedTeam:
-    """A team that asks ``function(observation)`` for each boat.
+    """Build a team that calls ``function(observation)`` for each boat.
 
     Args:
-        function: gets a boat's normalised observation (n_obs,) float32, returns its action; or a dict of such by agent.
+        function: receives a boat's normalised observation (n_obs,) float32 and returns its action; or a dict of such
+            functions by agent.
         name: name for records and reports.
 
     Raises:

@@ -1,9 +1,9 @@
-"""Rolling-horizon evolution of one boat's plan by rollouts in the simulator, and sailing plans in live games; compiled.
+"""Compiled rolling-horizon evolution of one boat's plan, by rollouts in the simulator; and playing plans in live games.
 
-Plans are rolled out one after another. A mutant begins where it first differs from its parent, and boats other than its
-own go as they did in the parent's rollout for as long as they stand as they did there (tagged or not, their flag taken
-or not): their motion hangs on nothing else. So little is rolled out twice, and every rollout ends in the same bits as
-one from the start with all boats.
+Plans are rolled out one after another. The rollout of a mutant starts at its first difference from its parent. The
+other boats repeat their recorded motion as long as their state is as recorded (tagged or not, their flag taken or not):
+their motion depends on nothing else. Little is therefore rolled out twice, and every result is bit for bit that of a
+rollout of all boats from the start.
 """
 
 from __future__ import annotations
@@ -29,54 +29,55 @@ STOP = HEADINGS
 N_MOVES = HEADINGS + 1
 """Macro-actions: full speed along one of eight absolute headings (45 deg apart, from north), and a stop."""
 MUTATED = 3.0
-"""Macro-actions of a plan that a mutation changes, on average, beside the first."""
+"""Mean number of macro-actions that a mutation changes besides the first."""
 
-# columns of what a rollout counts, blue's minus red's where two teams can have it
+# columns of a rollout's counts; blue's minus red's where both teams can have an event
 CAPTURES, GRABS, TAGS, MATE_HITS_BLUE, MATE_HITS_RED, FOE_HITS, NEAR_BLUE, NEAR_RED = 0, 1, 2, 3, 4, 5, 6, 7
 OUT_BLUE, OUT_RED = 8, 9
 N_COUNTED = 10
 PRICES = (10.0, 3.0, 2.0, 6.0, 0.05, 3.0, 4.0, 2.0)
-"""What a plan is worth to a team: a capture, grab and tag, less a hit with a mate, a near mate, a hit with a foe and a
-boat gone out; and a field width of progress. The paper's played for captures, progress and contacts of teammates."""
+"""Fitness weights of a plan: capture, grab and tag, minus hit of a teammate, near teammate, hit of an opponent and boat
+out of bounds, plus a field width of progress. The paper's weights are for captures, progress and contacts of
+teammates.
+"""
 NEAR_MATES_M = 6.0
-"""Closer than this, teammates are counted as near, decision by decision."""
+"""Teammates nearer than this are counted as near, in each decision."""
 KEEP_OFF_M = 5.0
-"""In live games a boat nearer than this to another, and not past it, turns away from it."""
+"""In live games a boat nearer than this to another one ahead of its beam turns away from it."""
 
 
 class Desk(NamedTuple):
-    """Where a search works: a game to play plans in, and how the rollout of the best plan went.
+    """Work space of a search: a game to play plans in, and the recorded rollout of the best plan.
 
-    A plan has H macro-actions, each held for ``repeats`` decisions; D is the decisions and S the steps of motion of a
-    rollout.
+    A plan has H macro-actions, each held for ``repeats`` decisions. A rollout has D decisions and S steps of motion.
     """
 
     repeats: int
     generations: int
     bench: Games  # one game
-    marks: Games  # H games: the best plan's as each macro-action begins
-    marked: Array  # (H, N_COUNTED) what had been counted by then
+    marks: Games  # H games: that of the best plan at the start of each macro-action
+    marked: Array  # (H, N_COUNTED) counts at that time
     state: Array  # (S, n, N_STATE) after each step of motion
     error_is_float32: BoolArray  # (S, n)
     on_side: BoolArray  # (S, n)
-    is_tagged: BoolArray  # (D, n) as each decision begins
+    is_tagged: BoolArray  # (D, n) at the start of each decision
     flag_taken: BoolArray  # (D, 2)
-    as_recorded: BoolArray  # (n,) boats that stand as recorded
-    counted: Array  # (N_COUNTED,) of the rollout at hand
+    as_recorded: BoolArray  # (n,) boats whose state is as recorded
+    counted: Array  # (N_COUNTED,) counts of the present rollout
     wanted: Array  # (1, n, 2) scratch
     commands: Array  # (1, n, 2) scratch
     brood: IntArray  # (P, H) plans of a generation
 
 
 def make_desk(config: GameConfig, population: int, generations: int, horizon: int, move_s: float) -> Desk:
-    """A desk for games by these rules.
+    """Return the work space for games by these rules.
 
     Args:
         config: of the forward model's games.
         population: plans of a generation.
         generations: times that the best plan is mutated.
         horizon: macro-actions of a plan.
-        move_s: time a macro-action is held, s.
+        move_s: time that a macro-action is held, s.
     """
     n, repeats = config.n_boats, max(round(move_s / config.decision_s), 1)
     decisions = horizon * repeats
@@ -113,18 +114,18 @@ def evolve(
     rng: np.random.Generator,
     desk: Desk,
 ) -> float:
-    """Improve one boat's plan while all others keep theirs; return what the best found is worth to its team.
+    """Improve one boat's plan while the others keep theirs; return the fitness of the best plan found.
 
     Args:
         rules: of the forward model.
         games: the live games.
-        b: the one that is searched in.
+        b: the game to search in.
         plans: (n, H) macro-actions of all boats, 0..8; the boat's row is replaced by the best found.
-        boat: whose plan.
-        hints: (k,) macro-actions to try held throughout, such as straight to the flag.
+        boat: the boat whose plan is improved.
+        hints: (k,) macro-actions to try for the whole plan, such as straight to the flag.
         home: (2,) where the boat takes the flag, m.
-        rng: of mutations.
-        desk: where to work.
+        rng: random numbers of mutations.
+        desk: work space.
     """
     copy_game(desk.marks, 0, games, b)
     for k in range(N_COUNTED):
@@ -158,7 +159,7 @@ def evolve(
 
 @kernel
 def _mutate(rng: np.random.Generator, parent: IntArray, brood: IntArray) -> None:
-    """Fill a brood (P, H) with the parent, and mutants of it: a stretch of a plan is replaced by one macro-action."""
+    """Fill a brood (P, H) with the parent and its mutants, in which one macro-action replaces a stretch of the plan."""
     horizon = parent.size
     for k in range(brood.shape[0]):
         _copy_plan(brood[k], parent)
@@ -179,7 +180,7 @@ def _copy_plan(to: IntArray, source: IntArray) -> None:
 
 @lean_kernel
 def _first_difference(plan: IntArray, other: IntArray) -> int:
-    """The first macro-action in which plans differ; their length where none does."""
+    """Return the first macro-action in which plans differ; their length if none does."""
     m = 0
     while m < plan.shape[0] and plan[m] == other[m]:
         m += 1
@@ -188,9 +189,10 @@ def _first_difference(plan: IntArray, other: IntArray) -> int:
 
 @lean_kernel
 def worth_of(rules: Rules, desk: Desk, boat: int, home: Array) -> float:
-    """What the plans just rolled out are worth to a boat's team, see `PRICES`.
+    """Return the fitness of the plans just rolled out for a boat's team, see `PRICES`.
 
-    Progress is how near the boat is to what it is after, 1 at it: the flag, or with it (or tagged) its home.
+    Progress is the boat's nearness to its goal, 1 at it. Its goal is the flag or, if it carries it or is tagged, its
+    home.
     """
     c, team, games = desk.counted, rules.team[boat], desk.bench
     capture, grab, tag, mate_hit, near_mate, foe_hit, out, progress = PRICES
@@ -205,7 +207,7 @@ def worth_of(rules: Rules, desk: Desk, boat: int, home: Array) -> float:
 
 @lean_kernel
 def copy_game(to: Games, t: int, source: Games, b: int) -> None:
-    """Make game ``t`` of one batch stand as game ``b`` of another, in all that decides how it goes on."""
+    """Copy all of game ``b`` of one batch that decides its course into game ``t`` of another."""
     to.rng[t] = source.rng[b]
     for team in range(2):
         to.flag_taken[t, team] = source.flag_taken[b, team]
@@ -226,10 +228,10 @@ def copy_game(to: Games, t: int, source: Games, b: int) -> None:
 
 @lean_kernel
 def roll_out(rules: Rules, desk: Desk, plans: IntArray, boat: int, begin: int, record: bool) -> None:
-    """Play plans (n, H) on the bench from the mark of macro-action ``begin`` to their end, and count what happens.
+    """Play plans (n, H) in the work space's game from the start of macro-action ``begin`` to their end; count events.
 
-    With ``record`` all boats are moved, and how it goes is kept. Else those but ``boat`` go as recorded while they can.
-    Events of later decisions count less than early ones.
+    With ``record`` all boats are simulated and recorded. Otherwise boats other than ``boat`` repeat their recorded
+    motion as long as possible. Later events count less than early ones.
     """
     games, horizon, c = desk.bench, plans.shape[1], desk.counted
     copy_game(games, 0, desk.marks, begin)
@@ -254,7 +256,7 @@ def roll_out(rules: Rules, desk: Desk, plans: IntArray, boat: int, begin: int, r
 
 @lean_kernel
 def _play_decision(rules: Rules, desk: Desk, plans: IntArray, move: int, number: int, record: bool) -> None:
-    """One decision on the bench, the ``number``-th of a rollout; contacts are left to `_count_pairs`."""
+    """Play decision ``number`` of a rollout; contacts are left to `_count_pairs`."""
     games, first = desk.bench, number * rules.decision_steps
     if record:
         for team in range(2):
@@ -278,7 +280,7 @@ def _play_decision(rules: Rules, desk: Desk, plans: IntArray, move: int, number:
 
 @lean_kernel
 def _compare(rules: Rules, desk: Desk, i: int, number: int) -> None:
-    """Find out whether a boat still stands as recorded as a decision begins; if not, make all of its state so."""
+    """Check whether a boat's state is as recorded at the start of a decision; if not, restore its full state."""
     games = desk.bench
     as_tagged = games.is_tagged[0, i] == desk.is_tagged[number, i]
     if as_tagged and games.flag_taken[0, rules.team[i]] == desk.flag_taken[number, rules.team[i]]:
@@ -292,7 +294,7 @@ def _compare(rules: Rules, desk: Desk, i: int, number: int) -> None:
 
 @lean_kernel
 def _put(rules: Rules, desk: Desk, i: int, step: int) -> None:
-    """Put a boat where it was after a recorded step, and the flag that it carries; nothing else of it is looked at."""
+    """Put a boat where it was after a recorded step, with the flag that it carries; nothing else of it is read."""
     games, x, y = desk.bench, desk.state[step, i, L.X], desk.state[step, i, L.Y]
     games.state[0, i, L.X], games.state[0, i, L.Y] = x, y
     games.on_side[0, i] = desk.on_side[step, i]
@@ -303,7 +305,7 @@ def _put(rules: Rules, desk: Desk, i: int, step: int) -> None:
 
 @lean_kernel
 def _sail(rules: Rules, desk: Desk, action: int, i: int, first: int, record: bool) -> None:
-    """Move a boat of the bench through the steps of a decision under a macro-action."""
+    """Simulate a boat through the steps of a decision under a macro-action."""
     games = desk.bench
     heading = games.state[0, i, L.HEADING]
     desk.wanted[0, i, 0] = 0.0 if action == STOP else rules.max_speed[i]
@@ -319,7 +321,7 @@ def _sail(rules: Rules, desk: Desk, action: int, i: int, first: int, record: boo
 
 @lean_kernel
 def _count_pairs(rules: Rules, state: Array, touching: BoolArray, counted: Array) -> None:
-    """Count contacts that are new and teammates that are near; ``touching`` (n, n) is brought up to date."""
+    """Count new contacts and near teammates; update ``touching`` (n, n)."""
     for i in range(rules.n_boats):
         for j in range(i + 1, rules.n_boats):
             dx, dy = state[j, L.X] - state[i, L.X], state[j, L.Y] - state[i, L.Y]
@@ -336,12 +338,12 @@ def _count_pairs(rules: Rules, state: Array, touching: BoolArray, counted: Array
 
 @lean_kernel
 def follow_plans(rules: Rules, games: Games, plans: IntArray, own: IntArray, out: Array) -> None:
-    """Commands of a team's boats for this step of live games; a boat too near to another turns away from it.
+    """Write commands of a team's boats for this step of live games; a boat too near to another turns away from it.
 
     Args:
         rules: of the games.
         games: B games.
-        plans: (B, n, H) macro-actions of all boats; the first is the one to follow.
+        plans: (B, n, H) macro-actions of all boats; the first one is played.
         own: (k,) numbers of the team's boats.
         out: (B, k, 2), written: speed m/s, relative heading deg.
     """
@@ -362,7 +364,7 @@ def follow_plans(rules: Rules, games: Games, plans: IntArray, own: IntArray, out
 
 @lean_kernel
 def _too_near(state: Array, i: int) -> int:
-    """Number of the boat nearest to boat ``i`` if it is within `KEEP_OFF_M` and not abaft the beam; -1 if it is not."""
+    """Return the boat nearest to boat ``i`` if it is within `KEEP_OFF_M` and ahead of the beam; otherwise -1."""
     near, least = -1, math.inf
     for j in range(state.shape[0]):
         gap = math.hypot(state[j, L.X] - state[i, L.X], state[j, L.Y] - state[i, L.Y])

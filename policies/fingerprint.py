@@ -1,4 +1,4 @@
-"""Telling whether a policy's files are still the same."""
+"""Fingerprints that tell whether a policy's files have changed."""
 
 from __future__ import annotations
 
@@ -14,16 +14,18 @@ from .own import file_of, own_code
 from .registry import SB3_PREFIX, WEIGHTS_PREFIX, names
 
 NO_PART = ("rows.jsonl", "games.jsonl", "pyvenv.cfg")
-"""What tells folders of results (also of 0.8.0 and before) and virtual environments, which are no part of a policy."""
+"""Files that mark folders of results (also of 0.8.0 and before) and virtual environments; these are no part of a
+policy.
+"""
 
 
 def fingerprint(name_or_path: str | Path) -> str:
-    """Digest of the files of a policy: other content or other names, other digest.
+    """Return a fingerprint of a policy's files; it changes with their content and names.
 
     Hidden files and folders, ``__pycache__``, folders of results and virtual environments do not count.
 
     Args:
-        name_or_path: as for `make`; of a ``solution.py`` all the folder it lies in counts, of your own file it alone.
+        name_or_path: as for `make`. For a ``solution.py`` its whole folder counts, for your own file only the file.
 
     Returns:
         16 hexadecimal digits; empty for our named policies and where there is no file.
@@ -51,7 +53,7 @@ def fingerprint(name_or_path: str | Path) -> str:
 
 
 def _files(folder: Path, seen: set[Path]) -> Iterator[Path]:
-    """Files that count, those behind links to folders too, each folder once."""
+    """Yield the files that count, also behind links to folders; each folder once."""
     if folder.resolve() in seen:
         return
     seen.add(folder.resolve())
@@ -60,7 +62,7 @@ def _files(folder: Path, seen: set[Path]) -> Iterator[Path]:
         if entry.name.startswith(".") or entry.name == "__pycache__":
             continue
         if not entry.is_dir():
-            if entry.is_file() or entry.is_symlink():  # no pipes and sockets: reading one may never end
+            if entry.is_file() or entry.is_symlink():  # skip pipes and sockets: reading one may never end
                 yield path
         elif not any((path / name).exists() for name in NO_PART):
             yield from _files(path, seen)

@@ -1,4 +1,4 @@
-"""`GuardedTeam`: plays foreign code boat by boat, so that whatever it does the game goes on, and reports on it."""
+"""`GuardedTeam`: plays foreign code boat by boat. Whatever the code does, the game goes on, with a report on it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Failure:
-    """One kind of failure: when it was seen first, how often in all, and how often by boat."""
+    """One kind of failure: its first occurrence, and its number in all and by boat."""
 
     kind: str
     agent_id: str
@@ -42,20 +42,20 @@ class PolicyReport:
     Attributes:
         policy: its name.
         games: games begun.
-        calls: answers asked for.
-        held: answers that could not be used; the boat held for that step.
-        failures: by kind, first seen first.
+        calls: calls of the code.
+        held: unusable answers; the boat held for that step.
+        failures: by kind, in the order of their first occurrence.
         mean_ms: mean time of a call, ms.
         max_ms: longest call, ms.
         slowest: agent id, game and step of the longest call.
-        late: calls that took longer than a step of the game.
+        late: calls longer than a step of the game.
         step_ms: length of a step of the game, ms.
-        decisions: steps in which a boat was answered for. Code may decide for all boats in one call, so that the time
-            of a decision, all calls of a step, is what counts.
+        decisions: steps in which the code was called. Code may decide for all boats in one call, so the time of a
+            decision (all calls of a step) is what counts.
         mean_decision_ms: mean time of a decision, ms.
-        max_decision_ms: longest, ms.
-        late_decisions: those that took longer than a step of the game.
-        steps: in which the policy was asked for actions, over all games.
+        max_decision_ms: longest decision, ms.
+        late_decisions: decisions longer than a step of the game.
+        steps: steps in which the policy had to act, over all games.
     """
 
     policy: str
@@ -75,7 +75,7 @@ class PolicyReport:
     steps: int = 0
 
     def failed_by_boat(self) -> dict[str, int]:
-        """Steps in which each boat had no usable answer; boats that always had one are left out."""
+        """Return the steps in which each boat had no usable answer; boats without such steps are left out."""
         counts: dict[str, int] = {}
         for failure in self.failures:
             for agent_id, count in failure.boats.items():
@@ -83,11 +83,11 @@ class PolicyReport:
         return dict(sorted(counts.items()))
 
     def as_dict(self) -> dict[str, Any]:
-        """The report as plain values, for JSON."""
+        """Return the report as plain values, for JSON."""
         return asdict(self)
 
     def lines(self) -> list[str]:
-        """The report in sentences; the first line stands for itself."""
+        """Return the report in sentences; the first line can be used alone."""
         agent_id, game, step = self.slowest
         timing = f"mean {self.mean_ms:.3f} ms, longest {self.max_ms:.1f} ms"
         if self.calls:
@@ -100,13 +100,13 @@ class PolicyReport:
 
 
 class _Times:
-    """How many, how long in all, the longest and how many above a limit, ns."""
+    """Statistics of times, ns: number, sum, longest, and how many exceed a limit."""
 
     def __init__(self) -> None:
         self.count = self.total = self.longest = self.late = 0
 
     def add(self, spent_ns: int, limit_ns: float) -> bool:
-        """Take one in; whether it is the longest."""
+        """Add a time; return whether it is the longest."""
         self.count += 1
         self.total += spent_ns
         self.late += spent_ns > limit_ns
@@ -115,7 +115,7 @@ class _Times:
 
 
 class Reporter:
-    """Collects a `PolicyReport` of a policy; each kind of failure is logged once."""
+    """Collects a `PolicyReport` of a policy; logs each kind of failure once."""
 
     def __init__(self, policy: str) -> None:
         self._policy = plain_text(policy, 80)
@@ -126,11 +126,11 @@ class Reporter:
         self._slowest, self._step_ns = ("", 0, 0), 0.0
 
     def begin(self, dt_s: float) -> None:
-        """A new game begins."""
+        """Begin a new game."""
         self._games, self._step, self._step_ns = self._games + 1, 0, dt_s * 1e9
 
     def next_step(self) -> None:
-        """All boats have answered."""
+        """Note that all boats have answered."""
         self._step += 1
         self._steps += 1
         if self._decision_ns:
@@ -138,13 +138,13 @@ class Reporter:
             self._decision_ns = 0
 
     def timed(self, agent_id: str, spent_ns: int) -> None:
-        """A call took ``spent_ns`` ns."""
+        """Note a call of ``spent_ns`` ns."""
         self._decision_ns += spent_ns
         if self._calls.add(spent_ns, self._step_ns):
             self._slowest = (agent_id, self._games - 1, self._step)
 
     def failed(self, agent_id: str, kind: str, message: str) -> None:
-        """A call gave nothing usable."""
+        """Note a call without a usable answer."""
         kind, message = plain_text(kind, 80), plain_text(message, 900)
         counts = self._counts.setdefault(kind, {})
         counts[agent_id] = counts.get(agent_id, 0) + 1
@@ -154,7 +154,7 @@ class Reporter:
             logger.warning("policy %s: %s (%s): %s; the boat holds for this step", self._policy, kind, where, message)
 
     def report(self) -> PolicyReport:
-        """The report so far."""
+        """Return the report so far."""
         failures = tuple(
             Failure(kind, *first, sum(self._counts[kind].values()), dict(sorted(self._counts[kind].items())))
             for kind, first in self._first.items()
@@ -181,7 +181,7 @@ class Reporter:
 
 @dataclass(frozen=True)
 class GameFacts:
-    """What foreign code in another process may know of a game; stands for its env there.
+    """What foreign code in another process may know of a game; it replaces the env there.
 
     Attributes:
         n_obs: length of an observation.
@@ -193,10 +193,10 @@ class GameFacts:
 
 
 def game_facts(env: Any) -> GameFacts:
-    """The facts of a game that somebody reads; facts are answered as they are.
+    """Return the facts of a game; facts pass through.
 
     Raises:
-        PolicyError: nobody reads it.
+        PolicyError: no reader for this game.
     """
     if isinstance(env, GameFacts):
         return env
@@ -205,40 +205,40 @@ def game_facts(env: Any) -> GameFacts:
 
 
 class ForeignCode(ABC):
-    """What a `GuardedTeam` drives; the base class of the adapters in this package."""
+    """Interface of the code that a `GuardedTeam` runs; base class of the adapters in this package."""
 
     @abstractmethod
     def begin(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:
-        """A game begins; what is raised here ends it, since no boat could play.
+        """Begin a game. An exception ends the game, because no boat could play.
 
-        Code that comes from a file may be given `GameFacts` for ``env``: it then runs in a process of its own.
+        Code from a file may receive `GameFacts` as ``env``: it then runs in a process of its own.
         """
 
     @abstractmethod
     def prepare(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> Answer:
-        """What answers for each boat in this step. Not guarded: must not run foreign code."""
+        """Return the function that answers for each boat in this step. Not guarded: it must not run foreign code."""
 
     def failed_within(self, agent_id: str) -> Fault | None:
-        """What went wrong inside although the boat was answered for, as (kind, explanation); None: nothing."""
+        """Return a fault inside the code although the boat has an answer; None if there is none."""
         return None
 
     def around(self) -> contextlib.AbstractContextManager[Any]:
-        """What must hold while foreign code runs, such as its working directory."""
+        """Return a context for running foreign code, such as its working directory."""
         return contextlib.nullcontext()
 
     def close(self) -> None:  # noqa: B027 (most code holds nothing)
-        """Give back what the code holds."""
+        """Release the resources of the code."""
 
 
 class ForeignTeam(ABC):
-    """A `TeamPolicy` round foreign code. A boat whose code raises or answers nonsense holds for that step.
+    """A `TeamPolicy` around foreign code. A boat whose code raises or answers nonsense holds for that step.
 
-    `report` says which agent, game and step, what, how often, and how long calls took. Each kind of failure is logged
-    once.
+    `report` tells agent, game and step, kind and number of failures, and the times of calls. Each kind of failure is
+    logged once.
 
     Attributes:
         name: for records and reports.
-        held: boats without a usable answer of the policy's own in this step, and why.
+        held: boats without a usable answer of their own in this step, and why.
     """
 
     def __init__(self, name: str) -> None:
@@ -251,7 +251,7 @@ class ForeignTeam(ABC):
         """Begin a game.
 
         Raises:
-            PolicyError: a game that nobody reads, unusable agent ids, or the code cannot begin.
+            PolicyError: no reader for the game, unusable agent ids, or the code cannot begin.
         """
         game = seen_game(env)
         game.check_team(agent_ids)
@@ -261,10 +261,10 @@ class ForeignTeam(ABC):
         self._begin(env, game, seed)
 
     def act(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> dict[str, Action]:
-        """The code's own actions, unchanged; ``HOLD`` where there is no usable one.
+        """Return the code's own actions, unchanged; ``HOLD`` where there is no usable one.
 
         Raises:
-            PolicyError: `reset` was not called, or observations or infos lack what the code is entitled to.
+            PolicyError: `reset` was not called, or observations or infos are incomplete.
         """
         if not self._ids:
             raise PolicyError(f"policy {self.name!r} has no game; call reset(env, agent_ids, seed) first")
@@ -277,12 +277,12 @@ class ForeignTeam(ABC):
         return actions
 
     def report(self) -> PolicyReport:
-        """Failures and times over all games so far."""
+        """Return failures and times over all games so far."""
         return self._reporter.report()
 
     @abstractmethod
     def close(self) -> None:
-        """Give back what the code holds; may be called again."""
+        """Release the resources of the code; may be called again."""
 
     @abstractmethod
     def _begin(self, env: Any, game: SeenGame, seed: int) -> None:
@@ -292,7 +292,7 @@ class ForeignTeam(ABC):
     def _answers(
         self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]
     ) -> dict[str, tuple[Any, Fault | None]]:
-        """Each boat's action, and what went wrong although there is one; calls are timed."""
+        """Return each boat's action, and a fault if there is one in spite of the action; calls are timed."""
 
     def _checked(self, agent_id: str, action: Any, fault: Fault | None) -> Action:
         unusable = self._reader.problem(agent_id, action)
@@ -316,7 +316,7 @@ class GuardedTeam(ForeignTeam):
         self.code = code
 
     def close(self) -> None:
-        """Give back what the code holds, such as temporary files; may be called again."""
+        """Release the resources of the code, such as temporary files; may be called again."""
         self.code.close()
 
     def _begin(self, env: Any, game: SeenGame, seed: int) -> None:

@@ -1,4 +1,4 @@
-"""A human at the keyboard drives one boat; another policy drives the rest of the team."""
+"""A human at the keyboard steers one boat; another policy plays the rest of the team."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ SHARP_TURN_DEG = 90.0
 class KeyboardTeam:
     """One boat steered with the arrow keys or w, a, s, d.
 
-    Ahead: full speed; with left or right: 45 deg to that side; left or right alone: a sharp turn at half speed (a boat
-    without thrust does not turn); back: 180 deg at half speed; shift: half speed; no key: stop.
+    Ahead: full speed; with left or right: 45 deg to that side. Left or right alone: a sharp turn at half speed, since a
+    boat without thrust does not turn. Back: 180 deg at half speed. Shift: half speed. No key: stop.
 
     Args:
         others: plays the team's other boats.
         agent: the human's boat, as a number in the team or an agent id.
-        keys: where the keys come from; None takes the window of render mode "human".
+        keys: returns the held keys; None reads the window of render mode "human".
     """
 
     def __init__(self, others: TeamPolicy, agent: int | str = 0, keys: Keys | None = None) -> None:
@@ -53,7 +53,7 @@ class KeyboardTeam:
             self._others.reset(env, self._rest, seed)
 
     def act(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> dict[str, Action]:
-        """Actions of the team."""
+        """Return the actions of the team."""
         if not self._boat:
             raise PolicyError("the keyboard policy has no game; call reset(env, agent_ids, seed) first")
         actions = self._others.act(observations, infos) if self._rest else {}
@@ -63,7 +63,7 @@ class KeyboardTeam:
 
 
 def steer(keys: set[str]) -> tuple[float, float]:
-    """Share of top speed and relative heading deg that the held keys ask for."""
+    """Return share of top speed and relative heading, deg, for the held keys."""
     side = bool(keys & RIGHT) - bool(keys & LEFT)
     if keys & BACK:
         return 0.5, 180.0
@@ -73,13 +73,13 @@ def steer(keys: set[str]) -> tuple[float, float]:
 
 
 def window_keys(env: Any) -> Keys:
-    """The keyboard of an env's window."""
+    """Return the keyboard of an env's window."""
     game = getattr(env, "unwrapped", env)
     if getattr(game, "render_mode", None) != "human":
         raise PolicyError("the keyboard policy needs a window: build the env with render_mode='human'")
 
     def keys() -> set[str]:
-        renderer = getattr(game, "renderer", None)  # made at the first picture
+        renderer = getattr(game, "renderer", None)  # exists from the first picture on
         return renderer.keys() if renderer is not None else set()
 
     return keys

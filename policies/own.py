@@ -1,6 +1,6 @@
-"""A policy of your own by the name of its file or module: ``mypol.py``, ``mypol.py:act``, ``mypol:act``.
+"""Policies of your own by the name of a file or module: ``mypol.py``, ``mypol.py:act``, ``mypol:act``.
 
-It is your own code, and runs in this process; what others hand in is a submission.
+Your own code runs in this process. Code of others is a submission.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from .protocol import TeamPolicy
 from .submissions.stage import ENTRY_FILE
 
 DEFAULT = "act"
-"""What is taken of a file where nobody says."""
+"""Name that is used if none is given."""
 FORMS = (
     f"a function {DEFAULT}(observation) -> action, a class with reset and act, or one with compute_action(obs, info)"
 )
 
 
 def own_code(text: str) -> tuple[str, str] | None:
-    """File or module, and the name in it, that a policy's name stands for; None: it is no such name."""
+    """Return file or module, and the name in it, for a policy's name; None if it is no such name."""
     where, colon, name = text.rpartition(":")
     if colon and name.isidentifier() and (where.endswith(".py") or all(map(str.isidentifier, where.split(".")))):
         return (where, name) if where not in ("sb3", "weights") else None
@@ -34,13 +34,13 @@ def own_code(text: str) -> tuple[str, str] | None:
 
 
 def file_of(where: str) -> Path | None:
-    """The file that holds it; None: an installed module."""
+    """Return the file of the code; None for an installed module."""
     path = Path(where).expanduser() if where.endswith(".py") else Path(*where.split(".")).with_suffix(".py")
     return path.absolute() if where.endswith(".py") or path.is_file() else None
 
 
 def check_own(where: str, name: str) -> None:
-    """Look whether there is such a file or module, without running it."""
+    """Check that the file or module exists, without running it."""
     path = file_of(where)
     try:
         there = path.is_file() if path is not None else importlib.util.find_spec(where) is not None
@@ -51,7 +51,7 @@ def check_own(where: str, name: str) -> None:
 
 
 def load_own(where: str, name: str) -> TeamPolicy:
-    """The team policy of that name in a file or module."""
+    """Return the team policy of that name in a file or module."""
     try:
         found = getattr(_module(where), name, None)
         if found is None:
@@ -65,7 +65,7 @@ def load_own(where: str, name: str) -> TeamPolicy:
     if hasattr(found, "reset") and hasattr(found, "act"):
         if not hasattr(found, "name"):
             found.name = f"{Path(where).stem}:{name}"
-        team: TeamPolicy = found  # told by what it has
+        team: TeamPolicy = found  # recognised by its attributes
         return team
     if hasattr(found, "compute_action") and isinstance(found, type):
         return from_agents(found, Path(where).stem)
@@ -75,7 +75,7 @@ def load_own(where: str, name: str) -> TeamPolicy:
 
 
 def _module(where: str) -> ModuleType:
-    """The module, run anew if it is a file, with what lies beside it importable."""
+    """Return the module; run it anew if it is a file, with its folder importable."""
     path = file_of(where)
     if path is None:
         return importlib.import_module(where)

@@ -1,4 +1,4 @@
-"""What a team policy is: one object that plays all boats of a team."""
+"""Protocols of policies: an object that plays all boats of a team, in one game or in a batch."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ class TeamPolicy(Protocol):
         """Begin a game; call it after ``env.reset``.
 
         Args:
-            env: the `MctfEnv` (or a wrapper round one) the game is played in.
+            env: the game's `MctfEnv`, or a wrapper around it.
             agent_ids: the boats to play, all of one team.
-            seed: seed of everything the policy draws.
+            seed: seed of everything that the policy draws.
         """
 
     def act(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> dict[str, Action]:
-        """Actions of the policy's boats, from the latest observations and infos of all boats."""
+        """Return the actions of the policy's boats, from the latest observations and infos of all boats."""
 
 
 @runtime_checkable
@@ -50,4 +50,4 @@ class BatchPolicy(Protocol):
         """Begin the chosen games (B,) anew, game b with seed + b; the others go on."""
 
     def act(self, core: Any, team: int) -> Array:
-        """Commands (B, n_team, 2), speed m/s and relative heading deg; the array is reused by the next call."""
+        """Return commands (B, n_team, 2), speed m/s and relative heading deg; the next call reuses the array."""

@@ -35,7 +35,7 @@ Roles = str | Sequence[str] | None
 
 @dataclass(frozen=True)
 class Entry:
-    """A named policy: what it does, and the plan its options make."""
+    """A named policy: its description, and a function from its options to its plan."""
 
     description: str
     plan: Callable[..., Plan]
@@ -46,7 +46,7 @@ def _alike(behaviour: Behaviour) -> Callable[[], Plan]:
 
 
 def _in_roles(level: str, roles: Roles, reach_m: float = MEDIUM_REACH_M) -> Plan:
-    """A team of attackers and defenders of a level; a word for all boats, or one each."""
+    """Return the plan of a team of attackers and defenders of a level; one role for all boats, or one each."""
     pair = Behaviour[f"{level}_ATTACK"], Behaviour[f"{level}_DEFEND"]
     return Plan(pair, () if roles is None else words_of("roles", roles, ROLES), reach_m=_reach(reach_m))
 
@@ -117,35 +117,35 @@ ENTRIES: dict[str, Entry] = {
     "waypoints": Entry("seeded random waypoints, or given ones (points=..., speed_fraction=...)", _waypoints),
     "mixed": Entry("any mix of the scripted boats (boats='medium_attack,rammer,hold')", _mixed),
 }
-"""The scripted policies; beside them there are the competition's `entrants` and "keyboard"."""
+"""The scripted policies. Further names are the competition's `entrants` and "keyboard"."""
 
 KEYBOARD = "keyboard"
 HIDDEN = "hidden"
 SB3_PREFIX = "sb3:"
 WEIGHTS_PREFIX = "weights:"
-"""What ``steerclear export`` wrote: numbers only, so loading it runs no code."""
+"""Prefix of files that ``steerclear export`` wrote. They hold numbers only, so loading one runs no code."""
 KEYBOARD_DESCRIPTION = "a human drives one boat in render mode 'human' (agent=..., others='medium')"
 
 
 def names() -> list[str]:
-    """Names `make` knows, besides paths of submissions, ``sb3:PATH.zip`` and ``weights:PATH.npz``."""
+    """Return the names that `make` knows, besides paths of submissions, ``sb3:PATH.zip`` and ``weights:PATH.npz``."""
     return [*ENTRIES, *entrants(), KEYBOARD]
 
 
 def describe() -> dict[str, str]:
-    """What each named policy does, in a line."""
+    """Return a one-line description of each named policy."""
     named = {**ENTRIES, **entrants()}
     return {name: entry.description for name, entry in named.items()} | {KEYBOARD: KEYBOARD_DESCRIPTION}
 
 
 def make(name_or_path: str | Path, game: int | None = None, **options: Any) -> TeamPolicy:
-    """A team policy by name or from a file.
+    """Build a team policy by name or from a file.
 
     Args:
         name_or_path: one of `names`; a submission's folder, zip or ``solution.py``; ``sb3:PATH.zip``;
             ``weights:PATH.npz``; or your own ``FILE.py``, ``FILE.py:NAME`` or ``MODULE:NAME``, see `own`.
-        game: number of the game in its series: which of its teams the hidden opponent fields; without it the seed
-            decides. No other policy looks at it.
+        game: number of the game in its series; it selects the team of the hidden opponent. Without it the seed decides.
+            No other policy uses it.
         **options: the policy's own options, see `describe`.
 
     Raises:
@@ -183,7 +183,7 @@ def make(name_or_path: str | Path, game: int | None = None, **options: Any) -> T
 
 
 def check(name_or_path: str | Path) -> None:
-    """Look whether there is such a policy, without loading it: for what is to be refused before long work begins.
+    """Check that a policy exists, without loading it, so that long work can be refused before it begins.
 
     Raises:
         PolicyError: an unknown name (the message names near matches), or no such file.
@@ -203,15 +203,15 @@ def check(name_or_path: str | Path) -> None:
 
 
 def make_batch(name: str, **options: Any) -> BatchPolicy:
-    """A policy for a whole batch of games.
+    """Build a policy for a whole batch of games.
 
     Args:
-        name: a scripted policy's name, that of an entrant that plays batches (the learned ones do),
-            ``weights:PATH.npz``, or ``sb3:PATH.zip`` (whose loading runs code of whoever made it).
+        name: name of a scripted policy or of an entrant that plays batches (the learned ones do), ``weights:PATH.npz``,
+            or ``sb3:PATH.zip`` (only its tensors are read: no code of it runs).
         **options: the policy's own options.
 
     Raises:
-        PolicyError: an unknown name or option, a file that cannot be loaded, or a policy that only plays single games.
+        PolicyError: an unknown name or option, a file that cannot be loaded, or a policy for single games only.
     """
     if name in ENTRIES:
         return ScriptedBatch(name, _plan(name, options))
@@ -227,12 +227,12 @@ def make_batch(name: str, **options: Any) -> BatchPolicy:
 
 
 def plays_batches(name: str) -> bool:
-    """Whether `make_batch` takes a name; whether its file is there is not looked at."""
+    """Return whether `make_batch` accepts a name; its file need not exist."""
     return name in ENTRIES or _batch_builder(name) is not None
 
 
 def _batch_builder(name: str) -> tuple[Callable[..., Any], tuple[Any, ...]] | None:
-    """What builds the batch policy of an entrant or a file, and its first arguments; None: single games only."""
+    """Return the builder of an entrant's or file's batch policy, and its first arguments; None: single games only."""
     from .entrants.learned import batch_builder
 
     entrant = entrants().get(name)
@@ -242,13 +242,13 @@ def _batch_builder(name: str) -> tuple[Callable[..., Any], tuple[Any, ...]] | No
 
 
 def looks_like_path(text: str) -> bool:
-    """Whether a policy's name is meant as a path: it exists, has a separator, or ends like a submission's file."""
+    """Return whether a policy's name is a path: it exists, has a separator, or ends like a submission's file."""
     path = "/" in text or "\\" in text or text.endswith((".zip", ".py")) or Path(text).exists()
     return bool(text) and own_code(text) is None and path
 
 
 def unknown_policy(name: str) -> PolicyError:
-    """The error for a name nobody knows."""
+    """Return the error for an unknown name."""
     near = difflib.get_close_matches(name, names(), n=3, cutoff=0.5)
     hint = f"did you mean {', '.join(near)}? " if near else ""
     files = "a submission's folder or zip, sb3:PATH.zip, weights:PATH.npz, your own FILE.py or MODULE:NAME"
@@ -265,7 +265,7 @@ def _keyboard(others: str | TeamPolicy = "medium", agent: int | str = 0, keys: K
 
 
 def _call(build: Callable[..., Any], name: str, options: dict[str, Any], *first: Any) -> Any:
-    """``build(*first, **options)``, with misspelt options explained."""
+    """Call ``build(*first, **options)``; explain misspelt options."""
     known = list(inspect.signature(build).parameters)[len(first) :]
     for option in options:
         if option not in known:

@@ -25,22 +25,22 @@ from .submissions.stage import ENTRY_FILE, check_members
 ALGORITHMS = ("PPO", "A2C", "DQN", "SAC", "TD3", "DDPG")
 _MARKS = (("clip_range", "PPO"), ("exploration_fraction", "DQN"), ("target_entropy", "SAC"), ("policy_delay", "TD3"))
 CARD, MOST_CARD_BYTES = "steerclear_card.json", 2**16
-"""Member of a zip of ``steerclear train`` that says what game the model learned; SB3 does not look at it."""
+"""Member of a zip of ``steerclear train`` with the game that the model learned; SB3 ignores it."""
 MAX_BYTES, MAX_DATA_BYTES = 1024**3, 64 * 1024**2
-"""Largest size of a model, unpacked, and of the settings in it, bytes."""
+"""Largest unpacked size of a model, and of the settings in it, bytes."""
 ENTRIES = frozenset({"entries", "entry", "submissions", "submission", "tournament", "tournaments"})
-"""Names of folders that hold what others handed in."""
+"""Names of folders that hold other people's entries."""
 UNREADABLE = (zipfile.BadZipFile, KeyError, ValueError, RecursionError, RuntimeError, EOFError, OSError, zlib.error)
-"""What reading a damaged or hostile zip raises."""
+"""Exceptions from reading a damaged or hostile zip."""
 logger = logging.getLogger(__name__)
 _SAID: set[Path] = set()
 
 
 class Sb3Code(ForeignCode):
-    """One model playing every boat from its own observation, deterministically.
+    """A model that plays every boat from its own observation, deterministically.
 
-    A Discrete model sends action numbers; a Box model sends (speed m/s, relative heading deg), or, when its space is
-    [-1, 1], the same scaled to 0..top speed and -180..180 deg.
+    A Discrete model's answers are action numbers. A Box model's answers are (speed m/s, relative heading deg). If its
+    space is [-1, 1], they are scaled to 0..top speed and -180..180 deg.
 
     Arguments and errors are those of `load_sb3`.
     """
@@ -69,7 +69,7 @@ class Sb3Code(ForeignCode):
             logger.warning("%s", code_warning(self._path))
         try:
             self._model = getattr(library, name).load(self._path, device="cpu")
-        except Exception as error:  # whatever the unpickler meets, it is this file that cannot be used
+        except Exception as error:  # the unpickler may raise anything for a file that cannot be used
             raise PolicyError(f"{self._path} cannot be loaded as {name}: {error}; name its algorithm") from error
         low, high = (getattr(self._model.action_space, name, None) for name in ("low", "high"))
         self._scaled = low is not None and high is not None and bool(np.all(low == -1.0) and np.all(high == 1.0))
@@ -85,7 +85,7 @@ class Sb3Code(ForeignCode):
         self._top_speed = facts.top_speed_mps
 
     def prepare(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> Answer:
-        """Predict one boat's action."""
+        """Return the function that predicts one boat's action."""
         return lambda agent_id: self._predict(agent_id, observations[agent_id])
 
     def _predict(self, agent_id: str, observation: np.ndarray) -> Any:
@@ -98,7 +98,7 @@ class Sb3Code(ForeignCode):
 
 
 def algorithm_of(saved: Mapping[str, Any]) -> str:
-    """Which algorithm saved such settings."""
+    """Return the algorithm that saved such settings."""
     for mark, algorithm in _MARKS:
         if mark in saved:
             return algorithm
@@ -106,7 +106,7 @@ def algorithm_of(saved: Mapping[str, Any]) -> str:
 
 
 def saved_settings(path: Path, max_bytes: int = MAX_BYTES) -> Mapping[str, Any]:
-    """The settings in a saved model, after a look at its sizes; nothing in it is run.
+    """Return the settings in a saved model after checking its sizes; no code of it runs.
 
     Raises:
         PolicyError: the file is not a saved model, or too large.
@@ -135,11 +135,11 @@ def saved_settings(path: Path, max_bytes: int = MAX_BYTES) -> Mapping[str, Any]:
 
 
 def check_origin(path: Path, allow_code: bool | None) -> None:
-    """Refuse a model of others: one in a submission, or in a folder named like those of entries.
+    """Refuse a model of others: one in a submission, or in a folder with a name such as entries.
 
     Args:
         path: the model.
-        allow_code: None looks where it lies; True allows any, False none.
+        allow_code: None decides by the model's place; True allows any, False none.
 
     Raises:
         PolicyError: it is refused.
@@ -155,7 +155,7 @@ def check_origin(path: Path, allow_code: bool | None) -> None:
 
 
 def entries_around(path: Path) -> Path | None:
-    """The folder that tells a model is somebody's entry: with a ``solution.py``, or so named; None: nothing does."""
+    """Return the folder that marks a model as an entry, by a ``solution.py`` or its name; None if there is none."""
     for place in (path.absolute(), path.resolve()):
         for folder in place.parents:
             if folder.name.lower() in ENTRIES or (folder / ENTRY_FILE).is_file():
@@ -164,12 +164,12 @@ def entries_around(path: Path) -> Path | None:
 
 
 def code_warning(path: str | Path) -> str:
-    """What loading a model means."""
+    """Return the warning on loading a model."""
     return f"loading the model {path} runs code of whoever made it"
 
 
 def trained_here(path: str | Path) -> bool:
-    """Whether a model is one of ``steerclear train``, by the card in its zip; a file that cannot be read is none."""
+    """Return whether ``steerclear train`` made a model, by the card in its zip; False for unreadable files."""
     try:
         return bool(read_card(Path(path).expanduser()).get("trained_with"))
     except PolicyError:
@@ -177,7 +177,7 @@ def trained_here(path: str | Path) -> bool:
 
 
 def read_card(file: Path) -> dict[str, Any]:
-    """The card of a model of ours; empty where there is none. Nothing else of the zip is read.
+    """Return the card of a model of ours; empty if there is none. Nothing else of the zip is read.
 
     Raises:
         PolicyError: the zip or its card cannot be read.
@@ -204,21 +204,21 @@ def load_sb3(
     allow_code: bool | None = None,
     max_bytes: int = MAX_BYTES,
 ) -> GuardedTeam:
-    """A saved Stable-Baselines3 model as a team policy.
+    """Load a saved Stable-Baselines3 model as a team policy.
 
-    It is asked anew in every step of the game, and loading it runs code of whoever made it; that is logged before. One
-    of ``steerclear train`` is refused: `make` plays what was trained, from its tensors alone.
+    The model decides anew in every step of the game. Loading it runs code of whoever made it; a warning is logged
+    before. A model of ``steerclear train`` is refused: `make` plays it from its tensors alone, as it was trained.
 
     Args:
-        path: the zip ``model.save`` wrote.
-        algorithm: one of ``ALGORITHMS``; None tells it from the file.
-        name: name for records and reports; None takes the file's.
-        allow_code: None refuses models that lie among entries of others (in a folder with a ``solution.py``, or named
-            entries, submissions or the like); True allows them, False refuses all.
+        path: the zip that ``model.save`` wrote.
+        algorithm: one of ``ALGORITHMS``; None detects it from the file.
+        name: name for records and reports; None uses the file's.
+        allow_code: None refuses models among other people's entries (in a folder with a ``solution.py``, or with a name
+            such as entries or submissions); True allows them, False refuses all.
         max_bytes: largest unpacked size.
 
     Raises:
-        PolicyError: the extra ``[train]`` is missing, the file is no such model, too large, or refused.
+        PolicyError: the extra ``[train]`` is missing, or the file is no such model, too large, or refused.
     """
     if trained_here(path):
         raise PolicyError(

@@ -1,4 +1,4 @@
-"""`ScriptedBatch`: a scripted team in every game of a `BatchedMctf`, decided by one compiled call."""
+"""`ScriptedBatch`: a scripted team in every game of a `BatchedMctf`, in one compiled call."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .plan import Plan
 from .roles import HARD_REACH_M, easy_attack, field_attack, hard, hard_defend, medium_defend
 
 _SEED_MASK = (1 << 64) - 1
-# plain integers: the kernels' constants must be types numba caches
+# plain integers: numba caches kernels only with constants of such types
 RANDOM, RAMMER, WAYPOINTS = int(Behaviour.RANDOM), int(Behaviour.RAMMER), int(Behaviour.WAYPOINTS)
 EASY_ATTACK, EASY_DEFEND = int(Behaviour.EASY_ATTACK), int(Behaviour.EASY_DEFEND)
 MEDIUM_ATTACK, MEDIUM_DEFEND = int(Behaviour.MEDIUM_ATTACK), int(Behaviour.MEDIUM_DEFEND)
@@ -24,11 +24,11 @@ HARD_DEFEND = int(Behaviour.HARD_DEFEND)
 
 
 class ScriptedBatch:
-    """A `BatchPolicy` for any scripted team. Reads the games' live arrays; nothing is copied.
+    """A `BatchPolicy` for any scripted team. It reads the games' live arrays without copying.
 
     Args:
         name: name for records and reports.
-        plan: who does what.
+        plan: behaviours of the boats.
     """
 
     def __init__(self, name: str, plan: Plan) -> None:
@@ -42,7 +42,7 @@ class ScriptedBatch:
         Args:
             core: the games.
             team: 0 blue, 1 red.
-            seed: game b draws from seed + b; also chooses the hidden opponent's composition.
+            seed: game b draws from seed + b; it also selects the hidden opponent's composition.
             boats: numbers of the boats to play; None for the whole team.
         """
         if team not in (0, 1):
@@ -74,7 +74,7 @@ class ScriptedBatch:
         seed_streams(seeds, self._boats, chosen, self._streams)
 
     def act(self, core: BatchedMctf, team: int) -> Array:
-        """Commands (B, n_team, 2), speed m/s and relative heading deg; the array is reused by the next call."""
+        """Return commands (B, n_team, 2), speed m/s and relative heading deg; the next call reuses the array."""
         if team != self._team or core.n_games != self._out.shape[0]:
             raise PolicyError(f"policy {self.name!r} was not reset for team {team} of these games; call reset first")
         games = Game(
@@ -93,12 +93,12 @@ class ScriptedBatch:
 
     @property
     def behaviours(self) -> list[list[Behaviour]]:
-        """What each boat does, by game."""
+        """Behaviour of each boat, by game."""
         return [[Behaviour(code) for code in row] for row in self._codes]
 
     @property
     def waypoints_reached(self) -> IntArray:
-        """Waypoints reached so far, (B, n_team); zero for boats that drive none."""
+        """Waypoints reached so far, (B, n_team); zero for boats without waypoints."""
         return self._memory[:, :, S.REACHED].astype(np.int64)
 
 
@@ -115,7 +115,7 @@ def _field_row(core: BatchedMctf, plan: Plan) -> Array:
 
 
 def _given_points(plan: Plan, n_boats: int) -> Array:
-    """(n_boats, k, 2) waypoints; a shared list is begun by each boat one point further on, so that they spread out."""
+    """Return waypoints (n_boats, k, 2); each boat starts a shared list one point later, so that they spread out."""
     if plan.points is None:
         return np.zeros((n_boats, 0, 2))
     if plan.points.ndim == 3:
@@ -129,7 +129,7 @@ def _given_points(plan: Plan, n_boats: int) -> Array:
 def command_boat(
     game: Game, boat: int, behaviour: int, memory: Array, given: Array, streams: np.ndarray, slot: int
 ) -> tuple[float, float]:
-    """Speed m/s and relative heading deg of one boat under its behaviour; advances its memory and stream."""
+    """Return speed m/s and relative heading deg of one boat under its behaviour; advance its memory and stream."""
     if behaviour == MEDIUM_ATTACK:
         return field_attack(game, boat, game.field[MEDIUM_REACH], False)
     if behaviour == MEDIUM_DEFEND:
@@ -157,7 +157,7 @@ def command_boat(
 def command_team(
     codes: IntArray, boats: IntArray, memory: Array, given: Array, streams: np.ndarray, game: Game, out: Array
 ) -> None:
-    """Commands of the boats of one team in one game, into ``out`` (n_team, 2): speed m/s, relative heading deg."""
+    """Write commands of one team's boats in one game into ``out`` (n_team, 2): speed m/s, relative heading deg."""
     for slot in range(boats.size):
         speed, heading = command_boat(game, boats[slot], codes[slot], memory[slot], given[slot], streams, slot)
         out[slot, 0] = speed
@@ -168,10 +168,10 @@ def command_team(
 def command_batch(
     codes: IntArray, boats: IntArray, memory: Array, given: Array, streams: np.ndarray, games: Game, out: Array
 ) -> None:
-    """``command_team`` for every game: the same arguments, with a leading axis of games.
+    """Run `command_team` for every game: the same arguments with a leading axis of games.
 
-    ``boats`` and ``given`` are the same in all games and have none, nor have ``limits``, ``team``, ``flag_home`` and
-    ``field`` of the games.
+    ``boats``, ``given`` and the games' ``limits``, ``team``, ``flag_home`` and ``field`` are the same in all games and
+    have no such axis.
     """
     for g in range(games.state.shape[0]):
         game = Game(

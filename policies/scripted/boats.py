@@ -1,6 +1,6 @@
-"""Boats that drive to points (fixed paths, given or random waypoints, a random walk), and the rammer.
+"""Boats that steer to points (fixed paths, given or random waypoints, a random walk), and the rammer.
 
-The rammer's lead pursuit of the nearest boat is the adversary every shield is measured against.
+The rammer pursues the nearest boat with lead; it is the reference adversary for every shield.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ LEAD_LIMIT_S = 30.0
 
 @lean_kernel
 def follow(game: Game, boat: int, x_m: float, y_m: float) -> tuple[float, float]:
-    """Full speed to a point, stop within the boat's own radius of it."""
+    """Steer to a point at full speed; stop within the boat's own radius of it."""
     right, forward = to_boat(game, boat, x_m, y_m)
     speed = 0.0 if math.hypot(right, forward) <= game.limits[boat, RADIUS] else game.limits[boat, MAX_SPEED]
     return speed, bearing_deg(right, forward)
@@ -70,9 +70,9 @@ def easy_defend(game: Game, boat: int, memory: Array) -> tuple[float, float]:
 def waypoints(
     game: Game, boat: int, memory: Array, given: Array, streams: np.ndarray, slot: int
 ) -> tuple[float, float]:
-    """Drive from waypoint to waypoint: the given ones in turn, or random ones when ``given`` is empty.
+    """Steer from waypoint to waypoint: the given ones in turn, or random ones if ``given`` is empty.
 
-    A waypoint not reached in ``WAYPOINT_TIMEOUT_S`` is given up, so that a boat cannot circle one for ever.
+    A waypoint not reached in ``WAYPOINT_TIMEOUT_S`` is skipped, so that a boat cannot circle one for ever.
     """
     x, y = game.state[boat, L.X], game.state[boat, L.Y]
     memory[TIME_LEFT] -= game.field[STEP]
@@ -88,7 +88,7 @@ def waypoints(
 
 @lean_kernel
 def next_waypoint(game: Game, boat: int, memory: Array, given: Array, streams: np.ndarray, slot: int) -> None:
-    """Put the next waypoint into the memory row."""
+    """Write the next waypoint into the memory row."""
     if given.shape[0] > 0:
         number = int(memory[GOAL]) % given.shape[0]
         memory[GOAL_X], memory[GOAL_Y] = given[number, 0], given[number, 1]
@@ -100,7 +100,7 @@ def next_waypoint(game: Game, boat: int, memory: Array, given: Array, streams: n
 
 @lean_kernel
 def random_point(game: Game, boat: int, streams: np.ndarray, slot: int) -> tuple[float, float]:
-    """Uniform in the field, off the walls, and outside the own flag's keep-out, which the boat cannot enter."""
+    """Draw a point uniformly in the field, off the walls and outside the own flag's keep-out."""
     home = game.flag_home[game.team[boat]]
     clear_m = game.field[KEEPOUT] + game.limits[boat, RADIUS] + WAYPOINT_REACHED_M
     x = y = 0.0
@@ -114,7 +114,7 @@ def random_point(game: Game, boat: int, streams: np.ndarray, slot: int) -> tuple
 
 @lean_kernel
 def spread(fraction: float, length_m: float) -> float:
-    """``fraction`` of the way between the two wall margins; the middle of a field too narrow for margins."""
+    """Return the point at ``fraction`` between the two wall margins; the middle of a field too narrow for margins."""
     margin = min(WALL_MARGIN_M, 0.5 * length_m)
     return margin + fraction * (length_m - 2.0 * margin)
 
@@ -123,7 +123,7 @@ def spread(fraction: float, length_m: float) -> float:
 def random_walk(game: Game, boat: int, memory: Array, streams: np.ndarray, slot: int) -> tuple[float, float]:
     """Draw one of the 17 discrete actions, hold its absolute heading and speed for 1 to 5 s, draw again.
 
-    A draw whose straight course would leave the field is turned to a random point inside it.
+    A course that would leave the field is replaced by one to a random point inside it.
     """
     memory[TIME_LEFT] -= game.field[STEP]
     if memory[TIME_LEFT] <= 0.0:
@@ -133,7 +133,7 @@ def random_walk(game: Game, boat: int, memory: Array, streams: np.ndarray, slot:
 
 @lean_kernel
 def draw_course(game: Game, boat: int, memory: Array, streams: np.ndarray, slot: int) -> None:
-    """Put a new held course into the memory row."""
+    """Write a new held course into the memory row."""
     hold_s = HOLD_MIN_S + (HOLD_MAX_S - HOLD_MIN_S) * next_uniform(streams, slot)
     action = min(int(17.0 * next_uniform(streams, slot)), 16)
     speed = 0.0 if action == 16 else game.limits[boat, MAX_SPEED] * (1.0 if action < 8 else 0.5)
@@ -151,7 +151,7 @@ def draw_course(game: Game, boat: int, memory: Array, streams: np.ndarray, slot:
 
 @lean_kernel
 def ram(game: Game, boat: int) -> tuple[float, float]:
-    """Steer for the point where the nearest boat will be met; stop when there is nobody to meet."""
+    """Steer for the predicted meeting point with the nearest boat; stop if there is none."""
     target = nearest_target(game, boat)
     if target < 0:
         return 0.0, 0.0
@@ -162,7 +162,7 @@ def ram(game: Game, boat: int) -> tuple[float, float]:
     x, y = game.state[target, L.X], game.state[target, L.Y]
     lead_s = meeting_time_s(x - game.state[boat, L.X], y - game.state[boat, L.Y], east_mps, north_mps, speed)
     margin = game.limits[boat, RADIUS]
-    # a boat that leaves the field is tagged and driven home: meet there, not beyond the edge
+    # a boat that leaves the field is tagged and sent home: meet it inside, not beyond the edge
     x = min(max(x + lead_s * east_mps, margin), game.field[WIDTH] - margin)
     y = min(max(y + lead_s * north_mps, margin), game.field[HEIGHT] - margin)
     return speed, bearing_deg(*to_boat(game, boat, x, y))
@@ -170,10 +170,10 @@ def ram(game: Game, boat: int) -> tuple[float, float]:
 
 @lean_kernel
 def meeting_time_s(east_m: float, north_m: float, east_mps: float, north_mps: float, speed_mps: float) -> float:
-    """Earliest time at which a boat at the origin, at ``speed_mps`` on a straight course, meets a straight mover.
+    """Return the earliest time at which a boat at the origin can meet a target on a straight course.
 
-    Solves |p + v t| = s t for the smallest t > 0. When it cannot be met (or only after ``LEAD_LIMIT_S``), the lead is
-    the time to cover the present distance, limited the same way: pursuit with a guess is better than none.
+    Solves |p + v t| = s t for the smallest t > 0. If there is no solution (or only after ``LEAD_LIMIT_S``), the lead is
+    the time to cover the present distance, with the same limit: an estimate is better than none.
 
     Args:
         east_m: target's position east of the boat, m.
@@ -202,7 +202,7 @@ def meeting_time_s(east_m: float, north_m: float, east_mps: float, north_mps: fl
 
 @lean_kernel
 def nearest_target(game: Game, boat: int) -> int:
-    """Nearest boat of the other team, or of any when told to; -1 when there is none."""
+    """Return the nearest boat of the other team, or of both with HIT_TEAM_MATES; -1 if there is none."""
     best, best_m = -1, math.inf
     for other in range(game.team.size):
         if other == boat or (game.team[other] == game.team[boat] and game.field[HIT_TEAM_MATES] == 0.0):

@@ -1,7 +1,7 @@
-"""What the scripted policies' compiled code reads and remembers, and its plane geometry.
+"""Arrays that the scripted policies' compiled code reads and writes, and its plane geometry.
 
-A team's own-end frame is the field as a team sees it whose flag is on the left (blue, as a rule); for a team whose flag
-is on the right it is the field turned by 180 deg. A boat's frame is (right, forward).
+The own-end frame of a team has its flag on the left. For a team with the flag on the left (blue, as a rule) it is the
+field. For the other team it is the field turned by 180 deg. A boat's frame is (right, forward).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from steerclear.shield.platforms import layout as L
 
 
 class Behaviour(IntEnum):
-    """What one boat does; a team is a list of these, one per boat."""
+    """Behaviour of one boat; a team is a list of these, one per boat."""
 
     HOLD = 0
     RANDOM = 1
@@ -33,21 +33,27 @@ class Behaviour(IntEnum):
 
 
 GOAL, GOAL_X, GOAL_Y, TIME_LEFT, HELD_SPEED, HELD_HEADING, REACHED, N_MEMORY = 0, 1, 2, 3, 4, 5, 6, 7
-"""Columns of a boat's memory: number of the path point or given waypoint it is heading for, waypoint east and north, m,
-time until it draws again, s (0 before the first draw), speed, m/s, and absolute heading, deg, held by the random walk,
-waypoints reached so far."""
+"""Columns of a boat's memory.
+
+They are: number of the path point or given waypoint it steers for; waypoint east and north, m; time until the next
+draw, s (0 before the first draw); speed, m/s, and absolute heading, deg, held by the random walk; waypoints reached so
+far.
+"""
 WIDTH, HEIGHT, KEEPOUT, STEP, SPEED_FRACTION, HIT_TEAM_MATES, MEDIUM_REACH, CORNER_INSET = 0, 1, 2, 3, 4, 5, 6, 7
 N_FIELD = 8
-"""Columns of the field row: field along x and y, m, radius round the own flag that its own boats may not enter, without
-the boat's radius, m, time between two decisions, s, share of its top speed a rammer or waypoint boat asks for, 1 when a
-rammer also aims at boats of its own team, distance within which opponents push a medium attacker off, m, and how far
-inside its own side's corners, along both edges, a team brings the flag to, m (0: not to corners)."""
+"""Columns of the field row.
+
+They are: field along x and y, m; keep-out radius round the own flag, without the boat's radius, m; time between two
+decisions, s; share of top speed of a rammer or waypoint boat; 1 if a rammer also targets teammates; distance within
+which opponents repel a medium attacker, m; inset of the capture points from the own side's corners, along both edges, m
+(0: captures are not at corners).
+"""
 MAX_SPEED, RADIUS, N_LIMIT = 0, 1, 2
 """Columns of a boat's limits: top speed, m/s, and agent radius, m."""
 
 
 class Game(NamedTuple):
-    """One game as the kernels see it: ``n`` boats, two teams (0 blue, 1 red)."""
+    """One game as the kernels read it: ``n`` boats, two teams (0 blue, 1 red)."""
 
     state: Array
     """``(n, N_STATE)`` state rows, see ``steerclear.shield.platforms.layout``."""
@@ -68,7 +74,7 @@ class Game(NamedTuple):
 
 @lean_kernel
 def to_boat(game: Game, boat: int, x_m: float, y_m: float) -> tuple[float, float]:
-    """Point of the field in the boat's frame: (right, forward), m."""
+    """Return a point of the field in the boat's frame: (right, forward), m."""
     heading = math.radians(game.state[boat, L.HEADING])
     east, north = x_m - game.state[boat, L.X], y_m - game.state[boat, L.Y]
     sine, cosine = math.sin(heading), math.cos(heading)
@@ -77,13 +83,13 @@ def to_boat(game: Game, boat: int, x_m: float, y_m: float) -> tuple[float, float
 
 @lean_kernel
 def boat_to_boat(game: Game, boat: int, other: int) -> tuple[float, float]:
-    """Another boat in the boat's frame: (right, forward), m."""
+    """Return another boat's place in the boat's frame: (right, forward), m."""
     return to_boat(game, boat, game.state[other, L.X], game.state[other, L.Y])
 
 
 @lean_kernel
 def unit(right: float, forward: float) -> tuple[float, float]:
-    """The vector scaled to length 1; a zero vector stays zero."""
+    """Scale a vector to length 1; a zero vector stays zero."""
     length = math.hypot(right, forward)
     if length == 0.0:
         return 0.0, 0.0
@@ -92,19 +98,19 @@ def unit(right: float, forward: float) -> tuple[float, float]:
 
 @lean_kernel
 def bearing_deg(right: float, forward: float) -> float:
-    """Relative bearing of a vector in the boat's frame, deg clockwise, in (-180, 180]."""
+    """Return the relative bearing of a vector in the boat's frame, deg clockwise, in (-180, 180]."""
     return math.degrees(math.atan2(right, forward))
 
 
 @lean_kernel
 def is_turned(game: Game, team: int) -> bool:
-    """Whether the team's flag is on the right, so that its own-end frame is the field turned by 180 deg."""
+    """Return whether the team's flag is on the right, so that its own-end frame is the field turned by 180 deg."""
     return game.flag_home[team, 0] > 0.5 * game.field[WIDTH]
 
 
 @lean_kernel
 def own_end_point(game: Game, team: int, along: float, across: float) -> tuple[float, float]:
-    """Point given as fractions of the field in the team's own-end frame, m in the field's frame."""
+    """Return a point in the field's frame, m, from fractions of the field in the team's own-end frame."""
     if is_turned(game, team):
         along, across = 1.0 - along, 1.0 - across
     return along * game.field[WIDTH], across * game.field[HEIGHT]
@@ -112,7 +118,7 @@ def own_end_point(game: Game, team: int, along: float, across: float) -> tuple[f
 
 @lean_kernel
 def place_of_capture(game: Game, boat: int) -> tuple[float, float]:
-    """Where a boat brings the flag to, m: its own flag's home, or the nearer of its side's corner marks."""
+    """Return where a boat brings the flag, m: its own flag's home, or the nearer of its side's corner marks."""
     team, inset_m = game.team[boat], game.field[CORNER_INSET]
     if inset_m == 0.0:
         return game.flag_home[team, 0], game.flag_home[team, 1]
@@ -123,7 +129,7 @@ def place_of_capture(game: Game, boat: int) -> tuple[float, float]:
 
 @lean_kernel
 def wrap_deg(angle: float) -> float:
-    """The same angle in [-180, 180)."""
+    """Wrap an angle into [-180, 180)."""
     return (angle + 180.0) % 360.0 - 180.0
 
 

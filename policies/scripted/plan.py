@@ -1,4 +1,4 @@
-"""`Plan`: who does what in a scripted team, for any team size and game."""
+"""`Plan`: the behaviours of a scripted team, for any team size and game."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .layout import Behaviour
 MEDIUM_REACH_M = 60.0
 ROLES = ("attack", "defend")
 COMPOSITIONS = ("defend", "attack", "mixed")
-"""The hidden opponent's teams, in the order in which consecutive seeds meet them."""
+"""The hidden opponent's teams, in the order of consecutive seeds."""
 
 
 @dataclass(frozen=True)
@@ -23,14 +23,14 @@ class Plan:
     """A scripted team's settings.
 
     Attributes:
-        pair: what an attacker does, and what a defender does.
+        pair: behaviour of an attacker, and of a defender.
         roles: "attack" and "defend", one for all boats or one each; empty: a third of the team (rounded) defends, last
-            boats first; None: as the hidden opponent, all defend, all attack or mixed in turn with the seed.
-        boats: what boats do, one for all or one each; with it ``pair`` and ``roles`` say nothing.
+            boats first; None: as the hidden opponent, all defend, all attack or mixed, in turn with the seed.
+        boats: behaviours, one for all or one each; if given, ``pair`` and ``roles`` have no effect.
         points: waypoints in m, (k, 2) for all boats or (n_team, k, 2) per boat; None for random ones.
-        speed_fraction: share of top speed that rammers and waypoint boats ask for.
-        target_team_mates: rammers aim at boats of their own team too.
-        reach_m: opponents within this distance push a medium attacker off, m.
+        speed_fraction: share of top speed of rammers and waypoint boats.
+        target_team_mates: rammers also target boats of their own team.
+        reach_m: opponents within this distance repel a medium attacker, m.
     """
 
     pair: tuple[Behaviour, Behaviour] = (Behaviour.HOLD, Behaviour.HOLD)
@@ -42,7 +42,7 @@ class Plan:
     reach_m: float = MEDIUM_REACH_M
 
     def cast(self, team_size: int, seed: int) -> list[Behaviour]:
-        """What each boat of a team does."""
+        """Return the behaviour of each boat of a team."""
         if self.boats:
             return _one_each("boats", self.boats, team_size)
         roles = roles_of(composition_of(seed)) if self.roles is None else self.roles
@@ -58,7 +58,7 @@ def _one_each(what: str, given: Sequence[Any], team_size: int) -> list[Any]:
 
 
 def words_of(what: str, given: str | Sequence[str], known: Sequence[str]) -> tuple[str, ...]:
-    """Words of a list, or of a text with commas."""
+    """Return the words of a list, or of a text with commas."""
     parts = given.split(",") if isinstance(given, str) else list(given)
     words = tuple(str(part).strip().lower() for part in parts)
     for word in words or ("",):
@@ -69,14 +69,14 @@ def words_of(what: str, given: str | Sequence[str], known: Sequence[str]) -> tup
 
 
 def composition_of(game: int) -> str:
-    """The hidden opponent's team in a game of a series."""
+    """Return the hidden opponent's team in a game of a series."""
     if isinstance(game, bool) or not isinstance(game, (int, np.integer)) or game < 0:
         raise PolicyError(f"game is {game!r}; give the number of the game, from 0")
     return COMPOSITIONS[int(game) % len(COMPOSITIONS)]
 
 
 def roles_of(composition: str | int) -> tuple[str, ...]:
-    """Roles of one of `COMPOSITIONS`, given by name or number."""
+    """Return the roles of one of `COMPOSITIONS`, given by name or number."""
     if isinstance(composition, int) and not isinstance(composition, bool) and 0 <= composition < len(COMPOSITIONS):
         composition = COMPOSITIONS[composition]
     if composition not in COMPOSITIONS:
@@ -85,7 +85,7 @@ def roles_of(composition: str | int) -> tuple[str, ...]:
 
 
 def checked_points(points: Any) -> Array | None:
-    """Waypoints as an array (k, 2) or (n_team, k, 2), m."""
+    """Return waypoints as an array (k, 2) or (n_team, k, 2), m."""
     if points is None:
         return None
     try:
@@ -98,7 +98,7 @@ def checked_points(points: Any) -> Array | None:
 
 
 def checked_number(name: str, value: Any, most: float, what: str) -> float:
-    """A number above 0 and at most so much, which is not infinite."""
+    """Check that a value is a finite number above 0 and at most ``most``."""
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value <= most or value == np.inf:
         raise PolicyError(f"{name} is {value!r}; give {what}")
     return float(value)

@@ -1,7 +1,7 @@
 """Attackers and defenders of the organisers' teams: a fixed loop (easy), potential fields (medium, hard).
 
-Attackers are drawn to the flag and pushed off opponents; defenders are drawn to opponents in their half (medium), or
-stay between them and the flag (hard).
+The flag attracts attackers, and opponents repel them. Medium defenders chase opponents in their half. Hard defenders
+stay between opponents and the flag.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ HOME_REACHED_M = 6.0  # the own flag's keep-out circle is larger than POINT_REAC
 GUARD_POINT = (0.25, 0.5)  # own-end fractions: halfway between the own flag and the scrimmage line's middle
 GUARD_REACHED_M = 2.5
 PERIMETER_KEEPOUTS = 5.0
-LEAST_KEEPOUT_M = 3.0  # where there is no keep-out circle, the perimeter is that of the competitions that have one
+LEAST_KEEPOUT_M = 3.0  # without a keep-out circle, the perimeter is that of the competitions that have one
 WALL_AHEAD_M = 7.0
 THREAT_M = 30.0
 
@@ -66,7 +66,7 @@ def easy_attack(game: Game, boat: int, memory: Array) -> tuple[float, float]:
 
 @lean_kernel
 def _point_of_loop(game: Game, boat: int, goal: int) -> tuple[float, float]:
-    """A point of the easy attacker's loop, m; its last is where captures are made."""
+    """Return a point of the easy attacker's loop, m; its last point is where captures are made."""
     if goal == 3 and game.field[CORNER_INSET] > 0.0:
         return place_of_capture(game, boat)
     along, across = EASY_LOOP[goal]
@@ -75,9 +75,10 @@ def _point_of_loop(game: Game, boat: int, goal: int) -> tuple[float, float]:
 
 @lean_kernel
 def field_attack(game: Game, boat: int, reach_m: float, shares_flag: bool) -> tuple[float, float]:
-    """Drawn to the flag (with it: to where captures are made), pushed off opponents and near walls, at full speed.
+    """Steer at full speed for the flag, repelled by opponents and near walls.
 
-    ``shares_flag``: a teammate's carrying the flag also sends this boat home.
+    With the flag, steer for the place of capture. With ``shares_flag`` the boat also goes home when a teammate carries
+    the flag.
     """
     team = game.team[boat]
     push_right, push_forward = push(game, boat, reach_m)
@@ -95,13 +96,16 @@ def field_attack(game: Game, boat: int, reach_m: float, shares_flag: bool) -> tu
 
 @lean_kernel
 def is_stalemate(right: float, forward: float, push_right: float, push_forward: float) -> bool:
-    """Whether pull and push nearly cancel (compared in size per boat axis, as the reference opponents do)."""
+    """Return whether attraction and repulsion nearly cancel.
+
+    As in the reference opponents, they are compared in size per boat axis.
+    """
     return abs(abs(right) - abs(push_right)) <= STALEMATE and abs(abs(forward) - abs(push_forward)) <= STALEMATE
 
 
 @lean_kernel
 def to_far_wall(game: Game, boat: int) -> tuple[float, float]:
-    """Way out of a stalemate: the farther long wall, with a bias to one so that the choice sticks."""
+    """Return the way out of a stalemate: to the farther long wall, biased so that the choice does not alternate."""
     y, height = game.state[boat, L.Y], game.field[HEIGHT]
     turned = is_turned(game, game.team[boat])
     starboard, port = (height - y, y) if turned else (y, height - y)
@@ -112,7 +116,7 @@ def to_far_wall(game: Game, boat: int) -> tuple[float, float]:
 
 @lean_kernel
 def push(game: Game, boat: int, reach_m: float) -> tuple[float, float]:
-    """Unit vector away from opponents (all of them, tagged or not) and walls ahead, each weighted by 1/distance."""
+    """Return the unit vector away from all opponents, tagged or not, and walls ahead, weighted by 1/distance."""
     right, forward = push_of_walls(game, boat, WALL_REACH_M, reach_m)
     for other in range(game.team.size):
         if game.team[other] != game.team[boat]:
@@ -124,7 +128,7 @@ def push(game: Game, boat: int, reach_m: float) -> tuple[float, float]:
 
 @lean_kernel
 def weighted(right: float, forward: float, reach_m: float) -> tuple[float, float]:
-    """Direction to a thing to keep off, times reach / distance; zero beyond the reach."""
+    """Return the direction to an object, times reach / distance; zero beyond the reach."""
     distance = math.hypot(right, forward)
     if distance >= reach_m or distance == 0.0:
         return 0.0, 0.0
@@ -133,7 +137,7 @@ def weighted(right: float, forward: float, reach_m: float) -> tuple[float, float
 
 @lean_kernel
 def push_of_walls(game: Game, boat: int, wall_reach_m: float, reach_m: float) -> tuple[float, float]:
-    """Weighted sum of the nearest points of walls that are ahead and within ``wall_reach_m`` (one per axis)."""
+    """Return the weighted sum of the nearest points of walls ahead and within ``wall_reach_m`` (one per axis)."""
     x, y = game.state[boat, L.X], game.state[boat, L.Y]
     width, height = game.field[WIDTH], game.field[HEIGHT]
     near_y, far_y, near_x, far_x = 0.0, height, 0.0, width
@@ -152,7 +156,7 @@ def push_of_walls(game: Game, boat: int, wall_reach_m: float, reach_m: float) ->
 def weighted_wall(
     game: Game, boat: int, x: float, y: float, wall_reach_m: float, reach_m: float
 ) -> tuple[float, float]:
-    """A wall's nearest point, weighted, or zero when it is not ahead or further than ``wall_reach_m``."""
+    """Return a wall's nearest point, weighted; zero if it is not ahead or beyond ``wall_reach_m``."""
     right, forward = to_boat(game, boat, x, y)
     if forward <= 0.0 or math.hypot(right, forward) >= wall_reach_m:
         return 0.0, 0.0
@@ -161,7 +165,7 @@ def weighted_wall(
 
 @lean_kernel
 def team_has_flag(game: Game, team: int) -> bool:
-    """Whether any boat of the team carries the flag."""
+    """Return whether any boat of the team carries the flag."""
     for boat in range(game.team.size):  # noqa: SIM110 (numba compiles no generators in any())
         if game.team[boat] == team and game.has_flag[boat]:
             return True
@@ -170,7 +174,7 @@ def team_has_flag(game: Game, team: int) -> bool:
 
 @lean_kernel
 def medium_defend(game: Game, boat: int) -> tuple[float, float]:
-    """Chase a taken flag, else the nearest untagged opponent in the own half, else wait in front of the base."""
+    """Chase a taken flag, otherwise the nearest untagged opponent in the own half, otherwise wait before the base."""
     team = game.team[boat]
     max_speed = game.limits[boat, MAX_SPEED]
     if team_has_flag(game, 1 - team):
@@ -188,7 +192,7 @@ def medium_defend(game: Game, boat: int) -> tuple[float, float]:
 
 @lean_kernel
 def hard_defend(game: Game, boat: int) -> tuple[float, float]:
-    """Stay between the own flag and the nearest opponent, go for it inside the perimeter, chase a taken flag."""
+    """Stay between own flag and nearest opponent; attack it inside the perimeter; chase a taken flag."""
     team = game.team[boat]
     x, y = game.flag_position[team]
     right, forward = to_boat(game, boat, x, y)
@@ -202,7 +206,7 @@ def hard_defend(game: Game, boat: int) -> tuple[float, float]:
 
 @lean_kernel
 def hard(game: Game, boat: int) -> tuple[float, float]:
-    """Both roles: attack, but defend while the own flag is taken or the opponents' centre comes near it."""
+    """Play both roles: attack, but defend while the own flag is taken or the opponents' centre is near it."""
     team = game.team[boat]
     defends = team_has_flag(game, 1 - team) or is_threatened(game, team)
     if defends and not game.has_flag[boat]:
@@ -212,7 +216,7 @@ def hard(game: Game, boat: int) -> tuple[float, float]:
 
 @lean_kernel
 def is_threatened(game: Game, team: int) -> bool:
-    """Whether the mean position of the opponents is within ``THREAT_M`` of the team's flag and one is untagged."""
+    """Return whether the opponents' mean position is within ``THREAT_M`` of the team's flag and one is untagged."""
     x = y = count = 0.0
     untagged = False
     for other in range(game.team.size):
@@ -225,7 +229,7 @@ def is_threatened(game: Game, team: int) -> bool:
 
 @lean_kernel
 def guard_point(game: Game, boat: int, flag_right: float, flag_forward: float) -> tuple[float, float]:
-    """Where a hard defender wants to be, boat frame, m."""
+    """Return the point that a hard defender steers for, boat frame, m."""
     target = nearest_opponent(game, boat, False)
     if target < 0:
         return flag_right, flag_forward
@@ -241,7 +245,10 @@ def guard_point(game: Game, boat: int, flag_right: float, flag_forward: float) -
 
 @lean_kernel
 def nearest_opponent(game: Game, boat: int, intruders_only: bool) -> int:
-    """Nearest untagged opponent (or, if none and all count, the nearest of all); -1 when there is none."""
+    """Return the nearest untagged opponent; -1 if there is none.
+
+    If all are tagged, return the nearest of them, unless ``intruders_only``.
+    """
     best, best_m = -1, math.inf
     fallback, fallback_m = -1, math.inf
     for other in range(game.team.size):

@@ -1,4 +1,4 @@
-"""`ScriptedTeam`: the same scripted play as a `TeamPolicy` in one `MctfEnv`."""
+"""`ScriptedTeam`: scripted play as a `TeamPolicy` in one `MctfEnv`."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from .plan import Plan
 
 
 class BatchTeam:
-    """A batch policy that plays some boats of a team in one game, so that one game plays as one of a batch.
+    """A batch policy for some boats of a team in one game; the game plays exactly as one of a batch.
 
     Args:
-        batch: the policy, whose ``reset`` takes the numbers of the boats.
+        batch: the policy; its ``reset`` accepts boat numbers.
     """
 
     def __init__(self, batch: Any) -> None:
@@ -30,7 +30,7 @@ class BatchTeam:
         """Begin a game.
 
         Raises:
-            PolicyError: not an `MctfEnv` (or a wrapper round one), unknown boats, boats of both teams, or a game that
+            PolicyError: not an `MctfEnv` (or a wrapper around one), unknown boats, boats of both teams, or a game that
                 the batch policy does not play.
         """
         self._core = game_core(env)
@@ -40,7 +40,7 @@ class BatchTeam:
         self._batch.reset(self._core, self._team, seed, self._boats)
 
     def act(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
-        """Actions (speed m/s, relative heading deg) of the boats; `infos` are not read.
+        """Return actions (speed m/s, relative heading deg) of the boats; `infos` are not read.
 
         Raises:
             PolicyError: `reset` was not called.
@@ -51,30 +51,30 @@ class BatchTeam:
         return {agent_id: (row[0], row[1]) for agent_id, row in zip(self._ids, rows, strict=True)}
 
     def _rows(self, observations: Mapping[str, np.ndarray]) -> Array:
-        """Commands (n, 2): of the live game, the observations are not read."""
+        """Return commands (n, 2) from the live game; the observations are not read."""
         found: Array = self._batch.act(self._core, self._team)[0]
         return found
 
 
 class ScriptedTeam(BatchTeam):
-    """A scripted team in one game: a front over `ScriptedBatch`, whose arguments it takes."""
+    """A scripted team in one game, a thin layer over `ScriptedBatch` with the same arguments."""
 
     def __init__(self, name: str, plan: Plan) -> None:
         super().__init__(ScriptedBatch(name, plan))
 
     @property
     def behaviours(self) -> dict[str, Behaviour]:
-        """What each boat does in this game."""
+        """Behaviour of each boat in this game."""
         return dict(zip(self._ids, self._batch.behaviours[0], strict=True))
 
     @property
     def waypoints_reached(self) -> dict[str, int]:
-        """Waypoints reached so far, by boat; zero for boats that drive none."""
+        """Waypoints reached so far, by boat; zero for boats without waypoints."""
         return dict(zip(self._ids, self._batch.waypoints_reached[0].tolist(), strict=True))
 
 
 def game_core(env: Any) -> BatchedMctf:
-    """The game behind an `MctfEnv` or a wrapper round one."""
+    """Return the game behind an `MctfEnv` or a wrapper around one."""
     core = getattr(getattr(env, "unwrapped", env), "core", None)
     if not isinstance(core, BatchedMctf) or core.n_games != 1:
         raise PolicyError(f"scripted policies need an MctfEnv, not {type(env).__name__}; use make_batch for batches")
@@ -82,7 +82,7 @@ def game_core(env: Any) -> BatchedMctf:
 
 
 def boat_numbers(core: BatchedMctf, agent_ids: Sequence[str]) -> IntArray:
-    """Numbers of boats of one team."""
+    """Return the numbers of boats of one team."""
     known = core.config.agent_ids
     unknown = [agent_id for agent_id in agent_ids if agent_id not in known]
     if unknown or not agent_ids or len(set(agent_ids)) != len(agent_ids):

@@ -1,4 +1,4 @@
-"""Loads a competition submission and plays it unchanged, with the past observations that it asks for."""
+"""Loading of competition submissions, which are played unchanged, with the past observations that they request."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ FAILURE_NAME = "steerclear_failure"
 
 
 class GlobalState(dict[Any, Any]):
-    """The global state, which also answers ``global_state[agent_id]`` with itself.
+    """The global state, which also returns itself for ``global_state[agent_id]``.
 
-    Submissions read it both ways: keyed by the state's own keys, or by agent id first like the observations.
+    Submissions read it both ways: by the state's own keys, or by agent id first, as with observations.
     """
 
     def __init__(self, state: Mapping[Any, Any], agent_ids: Sequence[str]) -> None:
@@ -49,15 +49,15 @@ class GlobalState(dict[Any, Any]):
         raise KeyError(key)
 
     def get(self, key: Any, default: Any = None) -> Any:
-        """As in a dict, agent ids included."""
+        """Return an entry as a dict does, also for agent ids."""
         return self if key in self._ids else super().get(key, default)
 
 
 class History:
-    """Past observations of all boats. Before the game is old enough, its first observation stands in.
+    """Past observations of all boats. Until the game is old enough, its first observation replaces older ones.
 
     Args:
-        ages: which ones are asked for, in steps, newest (0) first; (0,) for the present only.
+        ages: requested ages in steps, newest (0) first; (0,) for the present only.
     """
 
     def __init__(self, ages: tuple[int, ...]) -> None:
@@ -65,15 +65,15 @@ class History:
         self._past: deque[tuple[dict[str, Any], dict[str, Any]]] = deque(maxlen=ages[-1] + 1)
 
     def clear(self) -> None:
-        """A new game begins."""
+        """Begin a new game."""
         self._past.clear()
 
     def push(self, normalized: dict[str, Any], raw: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Take in the present step's observations by agent and answer those the submission is to see.
+        """Add the present observations by agent and return those for the submission.
 
         Returns:
-            Both dicts as given when no history is asked for; else per agent an array (k, n_obs) and an array (k,) of
-            dicts, newest first.
+            Both dicts as given if no history is requested. Otherwise, per agent, an array (k, n_obs) and an array (k,)
+            of dicts, newest first.
         """
         if self._ages == (0,):
             return normalized, raw
@@ -89,7 +89,7 @@ class History:
 
 
 def ages_of(module: ModuleType) -> tuple[int, ...]:
-    """Ages of the observations that a loaded ``gen_config.py`` asks for; all else in it is the game's affair."""
+    """Return the ages of the observations that a loaded ``gen_config.py`` requests; the rest of it is not used."""
     found = {
         name: value
         for name, value in vars(module).items()
@@ -114,7 +114,7 @@ def _count(config: Mapping[str, Any], name: str) -> int:
 
 
 def check_interface(instance: Any, source: object) -> None:
-    """Check that a ``solution`` can be asked for actions: one that cannot be called would hold all game."""
+    """Check before the game that a ``solution`` can be called for actions; otherwise its boats would hold all game."""
     method = getattr(instance, METHOD_NAME, None)
     if not callable(method):
         raise PolicyError(f"solution() of {source} has no method {METHOD_NAME!r}; define one")
@@ -130,14 +130,14 @@ def check_interface(instance: Any, source: object) -> None:
 
 
 class SubmissionCode(ForeignCode):
-    """A ``solution`` object and the folder it lives in.
+    """A ``solution`` object and its folder.
 
     Args:
         source: folder, zip, or its ``solution.py``.
         max_bytes: largest unpacked size of a zip.
 
     Raises:
-        PolicyError: it cannot be loaded or built, or asks for observations this game does not make.
+        PolicyError: it cannot be loaded or built, or requests observations that this game does not make.
     """
 
     def __init__(self, source: str | Path, max_bytes: int = MAX_BYTES) -> None:
@@ -156,7 +156,7 @@ class SubmissionCode(ForeignCode):
         self._told = ""
 
     def begin(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:
-        """A fresh instance for each game, built and run from the game's seed."""
+        """Build a fresh instance for each game, with libraries seeded from the game's seed."""
         if self._made is not None and not isinstance(env, GameFacts):  # a runner of this process checked it
             self._check_game(self._made, seen_game(env))
         self._instance = self._build(seed)
@@ -170,7 +170,7 @@ class SubmissionCode(ForeignCode):
         self._told = words
 
     def prepare(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> Answer:
-        """Copies, so that nothing the submission writes into them reaches the game or its opponent."""
+        """Return the answers on copies, so that nothing the submission writes reaches the game or its opponent."""
         try:
             raw = {agent_id: dict(infos[agent_id]["unnorm_obs"]) for agent_id in observations}
             state = GlobalState(next(iter(infos.values()))["global_state"], tuple(observations))
@@ -182,7 +182,7 @@ class SubmissionCode(ForeignCode):
         return lambda agent_id: compute_action(agent_id, normalized, raw, state)
 
     def failed_within(self, agent_id: str) -> tuple[str, str] | None:
-        """What a shielded zip says of the entry in it."""
+        """Return a failure that a shielded zip reports of the entry in it."""
         told = getattr(self._instance, FAILURE_NAME, None)
         try:
             kind, text = told(agent_id) or (None, None) if callable(told) else (None, None)
@@ -191,7 +191,7 @@ class SubmissionCode(ForeignCode):
         return None if kind is None else (plain_text(kind, 80), plain_text(text, 500))
 
     def around(self) -> contextlib.AbstractContextManager[Any]:
-        """Working directory and imports of the submission."""
+        """Return a context with the submission's working directory and imports."""
         return self._sandbox.active()
 
     def close(self) -> None:
@@ -232,7 +232,7 @@ class SubmissionCode(ForeignCode):
 
 
 def seed_libraries(seed: int) -> None:
-    """Seed the global random numbers a submission may draw from: Python's, NumPy's and, if loaded, PyTorch's."""
+    """Seed the global random numbers that a submission may use: Python's, NumPy's and, if loaded, PyTorch's."""
     random.seed(seed)
     np.random.seed(seed % 2**32)  # noqa: NPY002 (the submission's own choice of generator)
     torch = sys.modules.get("torch")
@@ -241,6 +241,6 @@ def seed_libraries(seed: int) -> None:
 
 
 def load_submission(path: str | Path, name: str | None = None, max_bytes: int = MAX_BYTES) -> GuardedTeam:
-    """A competition submission as a team policy."""
+    """Load a competition submission as a team policy."""
     code = SubmissionCode(path, max_bytes)
     return GuardedTeam(name or code.stage.source.stem, code)

@@ -1,4 +1,4 @@
-"""What an entry that steerclear wrote says of itself: the game it is for, and the shield in it."""
+"""What an entry written by steerclear states: the game it is for, and the shield in it."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from steerclear.shield.renamed import current_settings
 from ..actions import SeenGame
 
 ABOUT_FILE = "steerclear_entry.json"
-"""Lies beside ``solution.py``."""
+"""File beside ``solution.py``."""
 MAX_BYTES = 1 << 20
 
 
 class MadeFor(NamedTuple):
-    """What an entry is for.
+    """The game an entry is for, and its shield.
 
     Attributes:
         preset: rules of the game.
-        decision_s: time from decision to decision there, s.
-        platforms: names of the boats there, in order; empty: not said.
-        separation_m: distance that the shield in it keeps, m; NaN: there is none in it.
+        decision_s: time from decision to decision in that game, s.
+        platforms: names of the boats in that game, in order; empty: not stated.
+        separation_m: separation of its shield, m; NaN: it has no shield.
         shield: all settings of that shield, empty without one.
     """
 
@@ -42,17 +42,17 @@ class MadeFor(NamedTuple):
 
     @property
     def shielded(self) -> bool:
-        """Whether a shield is in it."""
+        """Whether the entry contains a shield."""
         return not math.isnan(self.separation_m)
 
     def to_bytes(self) -> bytes:
-        """Content of `ABOUT_FILE`."""
+        """Return the content of `ABOUT_FILE`."""
         told = {**self._asdict(), "separation_m": self.separation_m if self.shielded else None}
         return json.dumps(told, indent=1).encode()
 
 
 def made_for(source: str | Path) -> MadeFor | None:
-    """What the entry at a path says of itself; None: nothing that can be read, as others' do.
+    """Return what the entry at a path states; None if it states nothing readable, as entries of others.
 
     Args:
         source: folder, zip or ``solution.py`` of an entry.
@@ -68,7 +68,7 @@ def made_for(source: str | Path) -> MadeFor | None:
 
 
 def _content(source: Path) -> bytes:
-    """Bytes of the file, empty where there is none of its size; a pipe is not waited for."""
+    """Return the content of the file, empty if there is none of acceptable size; pipes are not read."""
     if source.is_dir() or source.suffix == ".py":
         path = (source if source.is_dir() else source.parent) / ABOUT_FILE
         return path.read_bytes() if path.is_file() and path.stat().st_size <= MAX_BYTES else b""
@@ -82,7 +82,7 @@ def _content(source: Path) -> bytes:
 
 
 def check_game(made: MadeFor, game: GameConfig | SeenGame, source: object) -> None:
-    """Refuse a game that the shield in an entry does not foresee: of another length of a decision, or other boats."""
+    """Refuse a game that the shield in an entry cannot predict: other decision times or other boats."""
     if not made.shielded:
         return
     names, other = platform_names(game), ""
@@ -97,12 +97,12 @@ def check_game(made: MadeFor, game: GameConfig | SeenGame, source: object) -> No
 
 
 def platform_names(game: GameConfig | SeenGame) -> tuple[str, ...]:
-    """Names of a game's boats, in order."""
+    """Return the names of a game's boats, in order."""
     return tuple(get_platform(boat).name for boat in game.platforms)  # type: ignore[union-attr]  # a tuple once built
 
 
 def words_of_less(made: MadeFor, game: GameConfig | SeenGame, source: object) -> str:
-    """What to say of a shield in an entry that keeps less than the distance at which a game counts; else nothing."""
+    """Return a warning if the shield's separation is less than the game's collision distance, otherwise no text."""
     counted_m = 2.0 * max(game.agent_radius_m)  # type: ignore[arg-type]  # a tuple once built
     if not made.shielded or made.separation_m >= counted_m - 1e-9:
         return ""

@@ -20,11 +20,11 @@ from typing import Any
 class Sandbox:
     """Working directory, import path and private modules of one submission.
 
-    Two submissions may both have a ``utils.py``: what each imports from its own folder is taken out of ``sys.modules``
-    when its code returns, and put back when its code runs again.
+    Two submissions may both have a ``utils.py``. When the code of one returns, the modules from its own folder are
+    removed from ``sys.modules``. They are put back when its code runs again.
 
     Args:
-        folder: where the submission's files are.
+        folder: the folder of the submission's files.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -35,7 +35,7 @@ class Sandbox:
 
     @contextlib.contextmanager
     def active(self) -> Iterator[None]:
-        """Run code as the submission expects to be run."""
+        """While inside, run code in the environment that the submission expects."""
         before = working_directory()
         displaced = self._displace()
         sys.modules.update(self._own)
@@ -57,14 +57,14 @@ class Sandbox:
             sys.modules.update(displaced)
 
     def _displace(self) -> dict[str, ModuleType]:
-        """Take out of ``sys.modules`` what other code loaded under names that the submission has too."""
+        """Remove from ``sys.modules`` what other code has loaded under names of the submission."""
         if not any(name in sys.modules for name in self._names):
             return {}
         taken = [name for name in sys.modules if name.partition(".")[0] in self._names]
         return {name: sys.modules.pop(name) for name in taken}
 
     def _collect(self) -> None:
-        """Remember which modules came from the submission's folder."""
+        """Store the modules that came from the submission's folder."""
         for name, module in list(sys.modules.items()):
             if name not in self._own and self._is_own(module):
                 self._own[name] = module
@@ -80,8 +80,8 @@ class Sandbox:
     def load(self, file: str) -> ModuleType:
         """Run a file of the folder as a module; call it inside `active`.
 
-        The module is the top-level ``solution`` (its file's name) for ``import`` and for pickles, and at the same time
-        part of a private package, so that ``from .helpers import x`` works too.
+        The module is the top-level ``solution`` (its file's name) for ``import`` and for pickles. It is also part of a
+        private package, so that ``from .helpers import x`` works.
         """
         stem = Path(file).stem
         package = ModuleType(f"submission_{uuid.uuid4().hex}")
@@ -99,14 +99,14 @@ class Sandbox:
 
 
 def importable_names(folder: Path) -> frozenset[str]:
-    """Top-level names that ``import`` finds in a folder, but for those of the standard library."""
+    """Return the top-level names that ``import`` finds in a folder, without those of the standard library."""
     names = {path.stem for path in folder.glob("*.py")}
     names |= {path.parent.name for path in folder.glob("*/*.py")}
     return frozenset(names) - sys.stdlib_module_names
 
 
 def working_directory() -> str | None:
-    """The working directory, or None when it was removed."""
+    """Return the working directory, or None if it was removed."""
     try:
         return os.getcwd()
     except FileNotFoundError:

@@ -1,4 +1,4 @@
-"""`Stage`: a private folder in which a submission finds its files, whether it came as a folder or as a zip."""
+"""`Stage`: a private folder with a submission's files, whether it came as a folder or as a zip."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ MAX_BYTES = 2 * 1024**3
 MAX_FILES = 20_000
 """Most files in a zip."""
 WORKING_DIR = "working_dir"
-"""Name under which the competition's own template looks for its files; in the stage it leads back to the stage."""
+"""Name under which the competition's own template looks for its files; in the stage it links back to the stage."""
 DEEP = ("*/*", "*/*/*")
-"""Folders that are looked into, no deeper, to say where the file lies: what was given may be somebody's home."""
+"""Depths searched for the file, only for the message; no deeper, since the given folder may be somebody's home."""
 _CHUNK = 1 << 20
 
 
 class Stage:
-    """A temporary folder with the submission's files at its top; removed by `close`, when collected, or at the end.
+    """A temporary folder with the submission's files at its top; removed by `close`, on collection, or at exit.
 
-    The end may be that of a pool's process, which never runs the interpreter's own; forked processes leave it alone.
-
-    A folder's files are linked, not copied, so that what the submission writes beside itself stays out of the folder.
+    At exit includes that of a pool's process, which skips the interpreter's own exit; forked processes do not remove
+    it. A folder's files are linked, not copied, so that files the submission writes beside itself do not reach the
+    source.
 
     Args:
         source: folder, zip, or the ``solution.py`` itself.
         max_bytes: largest unpacked size of a zip.
 
     Raises:
-        PolicyError: there is no submission there, or the zip is broken, unsafe or too large.
+        PolicyError: there is no submission, or the zip is broken, unsafe or too large.
     """
 
     def __init__(self, source: str | Path, max_bytes: int = MAX_BYTES) -> None:
@@ -47,7 +47,7 @@ class Stage:
             self.source = self.source.parent
         if not self.source.exists():
             raise PolicyError(f"there is no submission at {self.source}; give a folder or a zip with {ENTRY_FILE}")
-        if not (self.source.is_dir() or self.source.is_file()):  # a pipe would be waited for, a device read for ever
+        if not (self.source.is_dir() or self.source.is_file()):  # a pipe may block and a device never end
             raise PolicyError(f"{self.source} is no plain file; give a folder or a zip with {ENTRY_FILE}")
         top = Path(tempfile.mkdtemp(prefix="steerclear-submission-"))
         self._clean = Finalize(self, shutil.rmtree, (top,), {"ignore_errors": True}, exitpriority=0)
@@ -63,7 +63,7 @@ class Stage:
         else:
             unpack(self.source, top, max_bytes)
             folder = find_entry(top, self.source)
-        with contextlib.suppress(OSError):  # a file system without links: only the template's own paths need it
+        with contextlib.suppress(OSError):  # without links, only the template's own paths fail
             (folder / WORKING_DIR).symlink_to(".", target_is_directory=True)
         return folder
 
@@ -73,7 +73,7 @@ class Stage:
 
 
 def find_entry(folder: Path, source: Path) -> Path:
-    """The folder that holds ``solution.py``: this one, or its only subfolder that has it."""
+    """Return the folder with ``solution.py``: this one, or its only subfolder that has it."""
     if (folder / ENTRY_FILE).is_file():
         return folder
     inside = sorted(path.parent for path in folder.glob(f"*/{ENTRY_FILE}") if path.is_file())
@@ -84,14 +84,14 @@ def find_entry(folder: Path, source: Path) -> Path:
 
 
 def _deeper(folder: Path) -> str:
-    """Where the file lies too deep, for a message."""
+    """Return where the file lies too deep, for a message."""
     found = [path for levels in DEEP for path in folder.glob(f"{levels}/{ENTRY_FILE}") if path.is_file()]
     deep = sorted(path.relative_to(folder).as_posix() for path in found)
     return "none there" if not deep else f"none there, but {', '.join(deep[:3])}; zip what lies beside it"
 
 
 def link_folder(source: Path, top: Path) -> Path:
-    """Links in ``top`` to everything in ``source``; the source itself where links cannot be made."""
+    """Link everything in ``source`` into ``top``; return ``source`` itself if links cannot be made."""
     try:
         for path in source.iterdir():
             if path.name != "__pycache__":
@@ -136,13 +136,13 @@ def check_members(archive: Path, members: list[zipfile.ZipInfo], max_bytes: int)
 
 
 def is_inside(name: str) -> bool:
-    """Whether a member's name stays below the folder it is unpacked in, on any system."""
+    """Return whether a member's name stays below its folder, on any system."""
     parts = PurePosixPath(name).parts
     return bool(parts) and not name.startswith("/") and ".." not in parts and not re.search(r"[\\\0:]", name)
 
 
 def _write(opened: zipfile.ZipFile, member: zipfile.ZipInfo, top: Path) -> None:
-    """Write one member, stopping at the size the archive declared (a bomb lies about it)."""
+    """Write one member; stop at the size that the archive declares (a zip bomb declares a false one)."""
     target = top / PurePosixPath(member.filename)
     target.parent.mkdir(parents=True, exist_ok=True)
     left = member.file_size
