@@ -1,4 +1,4 @@
-"""The competition's teams, rebuilt from what its paper says of them; importing this enters all of ours."""
+"""The competition's teams, rebuilt from its paper's descriptions; importing this module registers all of ours."""
 
 from .catalogue import Entrant as Entrant
 from .catalogue import entrant as entrant

@@ -1,4 +1,4 @@
-"""The competition's entrants by name: a decorator enters a team, of ours or of another package."""
+"""The competition's entrants by name: a decorator registers a team, of ours or of another package."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from steerclear.shield.foreign import load_others
 
 Build = TypeVar("Build", bound=Callable[..., Any])
 GROUP = "steerclear.entrants"
-"""Entry points of this group name modules that hold ``@entrant`` classes."""
+"""Entry-point group of other packages: each entry names a module with ``@entrant`` classes."""
 
 
 @dataclass(frozen=True)
@@ -22,11 +22,11 @@ class Entrant:
     """A team of the competition.
 
     Attributes:
-        name: how `steerclear.policies.make` and the command line know it.
-        description: what it does, in a line.
+        name: name for `steerclear.policies.make` and the command line.
+        description: one line on what it does.
         team: its name in the paper's tables; empty for newcomers.
         build: from options to a `TeamPolicy`.
-        batch: from the same options to a `BatchPolicy`; None where it plays single games only.
+        batch: from the same options to a `BatchPolicy`; None if it plays single games only.
     """
 
     name: str
@@ -36,7 +36,7 @@ class Entrant:
     batch: Callable[..., Any] | None = None
 
     def files(self) -> str:
-        """Digest of the file that holds it; empty for ours, which the digest of the code covers."""
+        """Return the fingerprint of its file; empty for ours, which the code's fingerprint covers."""
         source = None if self.build.__module__.startswith("steerclear.") else inspect.getsourcefile(self.build)
         return "" if source is None else hashlib.sha256(Path(source).read_bytes()).hexdigest()[:16]
 
@@ -47,16 +47,16 @@ _ENTRANTS: dict[str, Entrant] = {}
 def entrant(
     name: str, description: str, team: str = "", batch: Callable[..., Any] | None = None
 ) -> Callable[[Build], Build]:
-    """Enter a team: put above a class, or a function that builds a `TeamPolicy`.
+    """Register a team: decorates a class, or a function that builds a `TeamPolicy`.
 
     Args:
         name: a new name, of letters, digits, ``_`` and ``-``.
-        description: what it does, in a line.
+        description: one line on what it does.
         team: its name in the paper's tables.
-        batch: from the same options to a `BatchPolicy`, where it plays many games at once.
+        batch: from the same options to a `BatchPolicy`, if it plays many games at once.
 
     Raises:
-        PolicyError: a name that is taken or that could be read as a path, or a class that cannot play.
+        PolicyError: the name is taken or could be read as a path, or the class is abstract.
     """
 
     def enter(build: Build) -> Build:
@@ -77,6 +77,6 @@ def entrant(
 
 
 def entrants() -> dict[str, Entrant]:
-    """All entrants, ours first, then those of other packages."""
+    """Return all entrants, ours first, then those of other packages."""
     load_others(GROUP)
     return dict(_ENTRANTS)

@@ -1,11 +1,13 @@
-"""Chao-NIWC-PAC: one boat plans on a grid, its mates sail circles.
+"""Chao-NIWC-PAC: one boat plans on a grid, its teammates sail circles.
 
-The paper: planning on a grid (by PDDL+), four moves, grabs and contacts as events, opponents static, the goal a capture
-or to be back in the own zone, planned anew as the game goes on; only the middle boat plans. In the entry's public code
-teammates are obstacles to it and sail constant turns. Filled in: 16 x 8 cells, searched by A*; a cell is watched whose
-middle is near an opponent that may tag, by the widest of `CONTACT_SHARES` that leaves a way; corners of a plan are cut
-where all cells on the line are open; a plan is asked for when the last one has ended, leads through what is now watched
-or blocked, or is `REPLAN_S` old, and taken over `TAKEN_S` later.
+From the paper: planning on a grid (by PDDL+) with four moves; grabs and contacts are events; opponents are static. The
+goal is a capture or to be back in the own zone. Only the middle boat plans, and replans during the game. In the entry's
+public code teammates are obstacles and sail constant turns.
+
+Our additions: 16 x 8 cells, searched by A*. A cell is watched if its middle is near an opponent that may tag; how near
+is the widest of `CONTACT_SHARES` that leaves a path. Corners of a plan are cut where all cells on the line are open.
+The boat replans when the last plan has ended, leads through a cell that is watched or blocked, or is `REPLAN_S` old.
+The new plan takes effect `TAKEN_S` later.
 """
 
 from __future__ import annotations
@@ -26,29 +28,30 @@ from .sight import Boat, Point, Sight
 
 Cell = tuple[int, int]
 State = tuple[Cell, bool]
-"""A cell, and whether the boat has had the flag by then."""
+"""A cell, and whether the boat has had the flag before it."""
 Node = TypeVar("Node", Cell, State)
 COLUMNS, ROWS = 16, 8
 LOOK_S, REPLAN_S, TAKEN_S = 1.0, 5.0, 0.5
-"""How often the boat looks whether its plan still holds, makes a new one anyhow, and how long it thinks, s."""
+"""Times, s: between checks of the plan, until a new plan is made in any case, and for thinking."""
 CONTACT_SHARES = (2.0, 1.6, 1.3, 1.0, 0.8)
-"""Distances that count as contact, in tag radii: the first that leaves a way. Opponents move while the plan is sailed,
-hence more than the radius where there is room; less than it is a gamble, taken where all else is shut."""
+"""Contact distances in tag radii; the first that leaves a path is used. Opponents move during a plan, hence more than
+the radius where possible; less is a gamble for when all other paths are shut.
+"""
 CIRCLE_DEG, CIRCLE_SHARE = 45.0, 0.5
 """Turn of the teammates, and share of their top speed."""
 STEP_M = 1.0
-"""Distance at which a line is looked at, m."""
+"""Distance between checked points of a line, m."""
 PLANNERS = ("auto", "astar")
 
 
 @dataclass(frozen=True)
 class GridProblem:
-    """What is to be planned.
+    """A planning problem.
 
     Attributes:
         start: the boat's cell.
-        carrying: whether it has the flag.
-        flag: cells from which the flag is grabbed.
+        carrying: the boat has the flag.
+        flag: cells from which the flag can be grabbed.
         own: columns below this one are the own zone.
         blocked: cells of teammates.
         watched: cells in which an opponent makes contact.
@@ -62,34 +65,34 @@ class GridProblem:
     watched: frozenset[Cell]
 
     def is_open(self, cell: Cell) -> bool:
-        """Whether the boat may move to a cell: in the field, no mate and no contact there."""
+        """Return whether the boat may move to a cell: in the field, without teammate or contact."""
         inside = 0 <= cell[0] < COLUMNS and 0 <= cell[1] < ROWS
         return inside and cell not in self.blocked and cell not in self.watched
 
     def beside(self, cell: Cell) -> list[Cell]:
-        """Open cells that the four moves lead to."""
+        """Return the open cells that the four moves lead to."""
         moves = ((1, 0), (-1, 0), (0, 1), (0, -1))
         return [to for x, y in moves if self.is_open(to := (cell[0] + x, cell[1] + y))]
 
 
 def cell_at(sight: Sight, point: Point) -> Cell:
-    """The cell of a point; of one outside the field the nearest."""
+    """Return the cell of a point; for one outside the field, the nearest cell."""
     column, row = int(point[0] / sight.size[0] * COLUMNS), int(point[1] / sight.size[1] * ROWS)
     return min(max(column, 0), COLUMNS - 1), min(max(row, 0), ROWS - 1)
 
 
 def middle_of(sight: Sight, cell: Cell) -> Point:
-    """The middle of a cell, m."""
+    """Return the middle of a cell, m."""
     return (cell[0] + 0.5) * sight.size[0] / COLUMNS, (cell[1] + 0.5) * sight.size[1] / ROWS
 
 
 def problem_at(sight: Sight, planner: int, contact_m: float) -> GridProblem:
-    """The problem of an own boat; cells are watched whose middle is so near to an opponent that may tag."""
+    """Return the problem of an own boat; watched are cells within ``contact_m`` of an opponent that may tag."""
     boat, own = sight.own[planner], int(sight.line / sight.size[0] * COLUMNS)
     start = cell_at(sight, boat.at)
     mates = {cell_at(sight, mate.at) for number, mate in enumerate(sight.own) if number != planner}
     taggers = [foe.at for foe in sight.foes if _may_tag(foe, sight)]
-    # the middle of the cell on the line counts as foreign: the zone begins where a boat surely is inside
+    # the cell on the line counts as foreign: the zone begins where a boat is certainly inside
     cells = [((column, row), middle_of(sight, (column, row))) for column in range(own, COLUMNS) for row in range(ROWS)]
     watched = {cell for cell, middle in cells if any(distance(middle, at) <= contact_m for at in taggers)}
     flag = frozenset(cell for cell, middle in cells if distance(middle, sight.goal) < sight.reach)
@@ -97,13 +100,13 @@ def problem_at(sight: Sight, planner: int, contact_m: float) -> GridProblem:
 
 
 def _may_tag(foe: Boat, sight: Sight) -> bool:
-    """Whether it may tag now, or will by the time a boat is there: near its base a tagged one is soon free again."""
+    """Return whether an opponent may tag now or when a boat arrives: near its base a tagged one is soon free."""
     soon_free = distance(foe.at, sight.base) < 2.0 * sight.reach
     return foe.recharged and foe.on_side and (soon_free or not foe.tagged)
 
 
 def search(problem: GridProblem) -> list[Cell] | None:
-    """The shortest way to the flag and back into the own zone, by A*; None where no way leads to a capture."""
+    """Return the shortest path to the flag and back into the own zone, by A*; None if there is none."""
     start: State = (problem.start, problem.carrying or problem.start in problem.flag)
     came: dict[State, State] = {}
     cost, queue = {start: 0}, [(_least(problem, start), start)]
@@ -121,7 +124,7 @@ def search(problem: GridProblem) -> list[Cell] | None:
 
 
 def _least(problem: GridProblem, state: State) -> int:
-    """A lower bound on the moves left: to the flag's columns where it is still to be had, then home."""
+    """Return a lower bound on the moves left: to the flag's columns if the boat lacks the flag, then home."""
     (column, _), carrying = state
     if carrying:
         return max(column - problem.own + 1, 0)
@@ -130,7 +133,7 @@ def _least(problem: GridProblem, state: State) -> int:
 
 
 def way_home(problem: GridProblem) -> list[Cell] | None:
-    """The shortest way into the own zone; None where none is open."""
+    """Return the shortest path into the own zone; None if none is open."""
     came: dict[Cell, Cell] = {}
     seen, edge = {problem.start}, [problem.start]
     while edge:
@@ -149,13 +152,13 @@ def way_home(problem: GridProblem) -> list[Cell] | None:
 
 
 def bolt(problem: GridProblem) -> list[Cell]:
-    """Straight into the own zone, whatever is in the way."""
+    """Return the cells straight into the own zone, whatever is in the way."""
     column, row = problem.start
     return [(to, row) for to in range(column - 1, problem.own - 2, -1)]
 
 
 def _trace(came: Mapping[Node, Node], end: Node) -> list[Node]:
-    """What leads to an end, without the start."""
+    """Return the path to an end, without the start."""
     found = []
     while end in came:
         found.append(end)
@@ -164,7 +167,7 @@ def _trace(came: Mapping[Node, Node], end: Node) -> list[Node]:
 
 
 def _planned(problem: GridProblem) -> list[Cell]:
-    """The cells to sail: with no way to a capture the way home, with the flag even through contacts."""
+    """Return the cells to sail: to a capture, otherwise home; with the flag even through contacts."""
     for plan in (search, way_home):
         if (found := plan(problem)) is not None:
             return found
@@ -172,7 +175,7 @@ def _planned(problem: GridProblem) -> list[Cell]:
 
 
 def _farthest(sight: Sight, at: Point, plan: list[Cell], problem: GridProblem) -> int:
-    """Number of the plan's last cell that can be made for straight away, not beyond the first one of the flag."""
+    """Return the last cell of the plan that a straight line reaches, at most the first one of the flag."""
     found = 0
     for number, cell in enumerate(plan):
         if number and not _straight(sight, at, middle_of(sight, cell), problem):
@@ -184,7 +187,7 @@ def _farthest(sight: Sight, at: Point, plan: list[Cell], problem: GridProblem) -
 
 
 def _straight(sight: Sight, a: Point, b: Point, problem: GridProblem) -> bool:
-    """Whether all cells on the line from a to b are open."""
+    """Return whether all cells on the line from a to b are open."""
     steps = max(math.ceil(distance(a, b) / STEP_M), 1)
     points = ((a[0] + (b[0] - a[0]) * k / steps, a[1] + (b[1] - a[1]) * k / steps) for k in range(steps + 1))
     return all(problem.is_open(cell_at(sight, point)) for point in points)
@@ -195,14 +198,14 @@ class Chao(EntrantTeam):
     """Plans for its middle boat.
 
     Args:
-        planner: "astar", which "auto" stands for, too.
+        planner: "astar" or "auto", which means the same.
         contact_m: distance to an opponent that counts as contact in plans, m; None for `CONTACT_SHARES`.
 
     Attributes:
-        think_times_s: how long each plan of this game took, s.
+        think_times_s: time for each plan of this game, s.
 
     Raises:
-        PolicyError: an unknown planner, or a distance that is none.
+        PolicyError: an unknown planner, or an invalid distance.
     """
 
     name = "chao"
@@ -217,7 +220,7 @@ class Chao(EntrantTeam):
         self.think_times_s: list[float] = []
 
     def begin(self, sight: Sight) -> None:
-        """Nothing is planned."""
+        """Begin a game without a plan."""
         self.think_times_s = []
         self._middle, self._plan, self._step = len(sight.own) // 2, list[Cell](), -1
         self._aim: int | None = None
@@ -227,7 +230,10 @@ class Chao(EntrantTeam):
         self._later = min(max(round(TAKEN_S / self.dt_s), 1), self._every - 1)
 
     def decide(self, sight: Sight) -> list[Order]:
-        """Plan now and then, follow the plan, let the others circle: to one side those before the planner."""
+        """Replan at times, follow the plan, and let the teammates circle.
+
+        Those before the planner circle to one side, the others to the other.
+        """
         self._step += 1
         self._think(sight)
         turns = [math.radians(-CIRCLE_DEG if number < self._middle else CIRCLE_DEG) for number in range(len(sight.own))]
@@ -238,7 +244,7 @@ class Chao(EntrantTeam):
     def _think(self, sight: Sight) -> None:
         phase = self._step % self._every
         if phase == 0 and not sight.own[self._middle].tagged:
-            self._aim = None  # what stood in the way may be gone
+            self._aim = None  # obstacles may have gone
             self._problem = self._now(sight)
             if not self._plan_holds(self._problem) or sight.time - self._planned_s >= REPLAN_S:
                 self._planned_s, self._asked = sight.time, self._problem
@@ -248,7 +254,7 @@ class Chao(EntrantTeam):
             self.think_times_s.append(time.perf_counter() - begun)
 
     def _now(self, sight: Sight) -> GridProblem:
-        """The problem with the widest contacts that leave a way, with the least where none does."""
+        """Return the problem with the widest contacts that leave a path; with the least if none does."""
         given = self._contact_m
         for radius in [share * sight.reach for share in CONTACT_SHARES] if given is None else [given]:
             problem = problem_at(sight, self._middle, radius)
@@ -257,7 +263,7 @@ class Chao(EntrantTeam):
         return problem
 
     def _plan_holds(self, problem: GridProblem) -> bool:
-        """Whether the plan goes on and through open cells, with the flag in the same hands as when it was made."""
+        """Return whether the plan has cells left, all open, and the flag is held or free as when it was made."""
         same, self._carried = self._carried == problem.carrying, problem.carrying
         return bool(self._plan) and same and all(map(problem.is_open, self._plan))
 
@@ -265,7 +271,7 @@ class Chao(EntrantTeam):
         boat = sight.own[self._middle]
         here, at = cell_at(sight, boat.at), dock(boat, sight)
         if boat.carries and boat.on_side and at is not None:
-            return boat.top, heading_to(boat.at, at)  # in the own zone nobody tags it: plans end at the line
+            return boat.top, heading_to(boat.at, at)  # nobody tags it in the own zone: plans end at the line
         if here in self._plan[: 1 if self._aim is None else self._aim + 1]:
             self._plan, self._aim = self._plan[self._plan.index(here) + 1 :], None
         if not self._plan:

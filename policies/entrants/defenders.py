@@ -1,6 +1,6 @@
 """Three teams that defend their base: Alamer-EJUST and Ohto-Indep hold stations, Meo-Indep marks attackers.
 
-What the paper says of each is in its class; what we filled in stands beside it.
+Each class states what the paper says of its team, and what we added.
 """
 
 from __future__ import annotations
@@ -23,15 +23,17 @@ FACING_RAD = math.radians(45.0)
 TURNING_SHARE = 0.1
 """Share of top speed at which a boat of Alamer turns on the spot."""
 MEO_ARRIVED_M, MARGIN_M = 3.0, 2.0
-"""Meo's boats stop so near to their points, which are kept so far off the dividing line and the edges, m."""
+"""Distances, m: from its point at which a boat of Meo stops; of such points from the dividing line and the edges."""
 OHTO_ARRIVED_M, COAST_S = 2.0, 3.0
-"""A boat has arrived this near to its post, or where it coasts to: it goes on for about its speed times so long."""
+"""A boat has arrived this near to its post, or within its coasting distance, about its speed times `COAST_S`."""
 DRIVEN_OFF = 0.6
-"""Of the way between two posts: a boat that holds goes back to its post from there."""
+"""Share of the distance between two posts from which a holding boat returns to its post."""
 SLOWING_S, SLOWEST = 20.0, 0.1
-"""A boat this far from its post in time slows down, to no less than this share of its top speed: it has no brakes."""
+"""Time from its post at which a boat slows down, and the least share of its top speed: it has no brakes."""
 ABEAM_RAD, CRAWL = math.radians(80.0), 0.3
-"""Off a post by more than this a boat turns at this share of its top speed: at full speed it would circle the post."""
+"""If its post is further off its heading than this, a boat turns at this share of top speed; at full speed it would
+circle the post.
+"""
 
 
 @entrant(
@@ -40,22 +42,22 @@ ABEAM_RAD, CRAWL = math.radians(80.0), 0.3
 class Alamer(EntrantTeam):
     """Holds near the base at the closest points of interception and turns to face the opponent.
 
-    Filled in: a foe's point of interception lies on its straight way to the flag, `REACHES` grab radii before the flag
-    (nearer when the foe is); points too near to each other are moved round the flag; boats take points by least total
-    distance, anew every `ANEW_S`, and move when theirs lies further off than `ALAMER_LEFT_M`; a boat turns to face at a
-    crawl, since these boats turn only under thrust.
+    Our additions: an opponent's point of interception is on its straight way to the flag, `REACHES` grab radii before
+    the flag (nearer if the opponent is). Points too near to each other are moved round the flag. Boats take points by
+    least total distance, anew every `ANEW_S`, and move when theirs is further off than `ALAMER_LEFT_M`. A boat turns to
+    face at low speed, since these boats turn only under thrust.
     """
 
     name = "alamer"
 
     def begin(self, sight: Sight) -> None:
-        """Nobody has a point yet."""
+        """Begin a game without points."""
         self._moving = [True] * len(sight.own)
         self._points: list[Point] = []
         self._until_s = -math.inf
 
     def decide(self, sight: Sight) -> list[Order]:
-        """Go to the points, hold there, face the nearest foes."""
+        """Steer to the points, hold there and face the nearest opponents."""
         if sight.time >= self._until_s:
             self._until_s = sight.time + ANEW_S
             points = _apart(sight, [_interception(sight, foe) for foe in sight.foes])
@@ -74,14 +76,14 @@ class Alamer(EntrantTeam):
 
 
 def _interception(sight: Sight, foe: Boat) -> Point:
-    """The point of a foe's way to the flag at which it is waited for."""
+    """Return the point of an opponent's way to the flag at which a boat waits for it."""
     inner, outer = sight.keepout + foe.radius + 1.0, REACHES * sight.reach
     x, y = ahead(sight.home, heading_to(sight.home, foe.at), clip(distance(sight.home, foe.at), inner, outer))
     return clip(x, 2.0, sight.line - 2.0), clip(y, 2.0, sight.size[1] - 2.0)
 
 
 def _apart(sight: Sight, points: list[Point]) -> list[Point]:
-    """The same points, those too near to an earlier one moved round the flag."""
+    """Return the points, with those too near to an earlier one moved round the flag."""
     kept: list[Point] = []
     for point in points:
         radius, heading = distance(sight.home, point), heading_to(sight.home, point)
@@ -95,17 +97,17 @@ def _apart(sight: Sight, points: list[Point]) -> list[Point]:
 
 @entrant("meo", "man-to-man defence: intercept points, pairs of least total distance (Meo-Indep)", "Meo-Indep")
 class Meo(EntrantTeam):
-    """Intercept points of every pair of defender and attacker, pairs of the least total distance, one boat to each.
+    """Sends one boat to each attacker's intercept point, in pairs of least total distance.
 
-    Each boat drives to its point at full speed and stops there; where paths of teammates cross, one heading is turned
-    to the opposite. Filled in: an intercept point is where the defender at full speed meets the attacker going on as it
-    does, moved into the own half; of two boats whose paths cross the later one is turned.
+    Each boat steers to its point at full speed and stops there. If paths of teammates cross, one heading is reversed.
+    Our additions: an intercept point is where the defender at full speed meets the attacker on a straight course, moved
+    into the own half. Of two boats with crossing paths the later one is reversed.
     """
 
     name = "meo"
 
     def decide(self, sight: Sight) -> list[Order]:
-        """Full speed to the intercept points, one of two crossing boats turned round."""
+        """Steer to the intercept points at full speed; reverse one of two crossing boats."""
         ways = [(boat.at, point) for boat, point in zip(sight.own, _marked(sight), strict=True)]
         crossing = {j for i, j in combinations(range(len(ways)), 2) if cross(*ways[i], *ways[j])}
         headings = [heading_to(*way) + (math.pi if number in crossing else 0.0) for number, way in enumerate(ways)]
@@ -116,7 +118,7 @@ class Meo(EntrantTeam):
 
 
 def _marked(sight: Sight) -> list[Point]:
-    """Where each own boat meets the attacker it marks; its own place where there are fewer attackers."""
+    """Return where each own boat meets the attacker it marks; its own place if there are fewer attackers."""
 
     def met(boat: Boat, foe: Boat) -> Point:
         x, y = meeting_point(boat, foe)
@@ -134,10 +136,10 @@ def _marked(sight: Sight) -> list[Point]:
 
 @entrant("ohto", "stationary defence: holds before its base (Ohto-Indep)", "Ohto-Indep")
 class Ohto(EntrantTeam):
-    """Holds where it starts, near the base: there and in the presets that is a row across the own half.
+    """Holds its start places near the base: in the paper and in the presets a row across the own half.
 
-    Filled in: where a game starts boats elsewhere, they first drive to the places of that row, by least total distance,
-    and hold there for good.
+    Our additions: if a game starts boats elsewhere, they first steer to the places of that row, by least total
+    distance, and hold there for the rest of the game.
     """
 
     name = "ohto"
@@ -150,7 +152,7 @@ class Ohto(EntrantTeam):
         self._moving = [True] * len(sight.own)
 
     def decide(self, sight: Sight) -> list[Order]:
-        """Hold; drive back when the game drove a boat off."""
+        """Hold; return to the post if the game moved a boat away."""
         return [self._order(boat, number) for number, boat in enumerate(sight.own)]
 
     def _order(self, boat: Boat, number: int) -> Order:

@@ -1,11 +1,13 @@
 """Lucas-QMU: rolling-horizon evolution for many boats.
 
-The paper: action sequences of macro-actions are evolved in a forward model (rolling-horizon evolution: Gaina, Devlin,
-Lucas and Perez-Liebana 2020, arXiv 2003.12331), for one boat at a time, own and opposing players in alternation
-(co-evolution: Liu, Perez-Liebana and Lucas 2016, arXiv 1607.01730), with a shift buffer; rules made for the score
-refine the plan. Filled in: the forward model is the batched simulator itself; macro-actions are eight headings at full
-speed and a stop, held for `MOVE_S`; mutation, fitness weights and the rules are ours. The fitness counts captures,
-grabs, tags, progress, boats gone out of bounds, and contacts with teammates and opponents.
+From the paper: sequences of macro-actions are evolved in a forward model (rolling-horizon evolution: Gaina, Devlin,
+Lucas and Perez-Liebana 2020, arXiv 2003.12331). Each search is for one boat; own and opposing players alternate
+(co-evolution: Liu, Perez-Liebana and Lucas 2016, arXiv 1607.01730), with a shift buffer. Rules made for the score
+refine the plan.
+
+Our additions: the forward model is the batched simulator itself. Macro-actions are eight headings at full speed and a
+stop, held for `MOVE_S`. Mutation, fitness weights and the rules are ours. The fitness counts captures, grabs, tags,
+progress, boats out of bounds, and contacts with teammates and opponents.
 """
 
 from __future__ import annotations
@@ -30,12 +32,13 @@ MOVE_S = 1.2
 HORIZON = 15
 POPULATION, GENERATIONS = 15, 4
 STEP_S = 0.2
-"""Step of the forward model, s: twice the game's, which costs a tenth of a metre over a plan and halves the time.
-Decisions of several steps are played as they are, their headings held."""
+"""Step of the forward model: twice the game's, which costs a tenth of a metre over a plan and halves the time.
+Decisions of several steps are simulated unchanged, with headings held.
+"""
 
 
 class LucasBatch:
-    """A `BatchPolicy` that searches with the simulator, in one game after another: at every macro-action for one boat.
+    """A `BatchPolicy` that searches with the simulator, game after game: at every macro-action for one boat.
 
     Args:
         population: plans of a generation.
@@ -43,10 +46,10 @@ class LucasBatch:
         horizon: macro-actions of a plan.
 
     Attributes:
-        think_times_s: of the searches for one boat so far.
+        think_times_s: times of the searches for one boat so far.
 
     Raises:
-        PolicyError: a number that is none, or below 2, 1 and 1.
+        PolicyError: a value is not a whole number, or below 2, 1 and 1.
     """
 
     name = "lucas"
@@ -80,7 +83,7 @@ class LucasBatch:
         self.restart(self._mine, seed)
 
     def plays(self, games: BoolArray) -> None:
-        """Only these games (B,) are searched in from now on."""
+        """Search only in these games (B,) from now on."""
         self._mine = games
 
     def restart(self, chosen: BoolArray, seed: int) -> None:
@@ -90,7 +93,7 @@ class LucasBatch:
             self._rngs[int(game)] = np.random.default_rng([(int(seed) + int(game)) & 0x7FFFFFFF, 0x10CA5])
 
     def act(self, core: BatchedMctf, team: int) -> Array:
-        """Commands (B, n_team, 2), speed m/s and relative heading deg; the array is reused by the next call."""
+        """Return commands (B, n_team, 2), speed m/s and relative heading deg; the next call reuses the array."""
         if team != self._team or core.n_games != self._mine.size:
             raise PolicyError(f"policy {self.name!r} was not reset for team {team} of these games; call reset first")
         for game in np.flatnonzero(self._mine & (self._age % self._every == 0)):
@@ -100,7 +103,7 @@ class LucasBatch:
         return self._out
 
     def _think(self, core: BatchedMctf, game: int) -> None:
-        """A macro-action is over: drop it from every plan, repeat the last (the shift buffer), and search."""
+        """Search at the end of a macro-action: drop it from every plan, repeat the last one (shift buffer), evolve."""
         begun, plans, move = time.perf_counter(), self._plans[game], int(self._age[game]) // self._every
         if move:
             plans[:, :-1] = plans[:, 1:].copy()
@@ -113,7 +116,7 @@ class LucasBatch:
 
 
 def home_of(core: BatchedMctf, team: int, boat: int, game: int = 0) -> Array:
-    """Where a boat takes the flag, m: the nearest dock from where it is now, else the base."""
+    """Return where a boat brings the flag, m: the nearest dock, otherwise the base."""
     docks = np.array(docks_of(core, team)).reshape(-1, 2)
     if not len(docks):
         return np.asarray(core.flag_home[team])
@@ -122,7 +125,7 @@ def home_of(core: BatchedMctf, team: int, boat: int, game: int = 0) -> Array:
 
 
 def hints_for(core: BatchedMctf, boat: int, home: Array, game: int = 0) -> IntArray:
-    """Macro-actions that are worth a try at once: straight to the other flag, straight home, and a stop."""
+    """Return macro-actions to try first: straight to the other flag, straight home, and a stop."""
     place, goal = core.state[game, boat, :2], core.flag_position[game, 1 - int(core.team[boat])]
     headings = [math.degrees(math.atan2(aim[0] - place[0], aim[1] - place[1])) for aim in (goal, home)]
     return np.array([*(round(heading / 45.0) % HEADINGS for heading in headings), STOP], dtype=np.int64)
@@ -135,7 +138,7 @@ def hints_for(core: BatchedMctf, boat: int, home: Array, game: int = 0) -> IntAr
     batch=LucasBatch,
 )
 class Lucas(BatchFront):
-    """Searches with the simulator: a thin front over `LucasBatch`, whose arguments it takes."""
+    """Searches with the simulator: a thin layer over `LucasBatch` with the same arguments."""
 
     name = "lucas"
 

@@ -1,8 +1,8 @@
-"""Crowley-BU-LL's primitives as options, and a team that plays fixed ones.
+"""Crowley-BU-LL's primitives as options, and a team that plays given ones.
 
-The paper: the entry learned to choose among attack, flank, avoid, retreat, guard, tag and no-op. Here they are options
-(Sutton, Precup and Singh 1999): each says when it may begin, what it does, and when it ends. What a learner chooses
-with is its own affair; `OptionsTeam` plays given ones.
+From the paper: the entry learned to choose among attack, flank, avoid, retreat, guard, tag and no-op. Here they are
+options (Sutton, Precup and Singh 1999): each states when it may begin, what it does, and when it ends. How a learner
+chooses is up to the learner; `OptionsTeam` plays given options.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from .sight import Boat, Sight
 Test = Callable[[Sight, int], bool]
 Steer = Callable[[Sight, int], Order]
 LONGEST_S = 30.0
-"""An option that has not ended by then is ended, s."""
+"""An option ends after this time at the latest."""
 EVERY_S = 1.0
-"""Time between looks, s."""
+"""Time between choices."""
 AVOID_M = 16.0
 EDGE_M = 4.0
 SHOWN = ("x", "y", "heading", "speed", "tagged", "carries", "on_side", "recharged")
-"""What a choice may depend on of each boat."""
+"""What a choice may depend on, of each boat."""
 
 
 @dataclass(frozen=True)
 class Option:
-    """A primitive. ``begins`` and ``ends`` look at a sight and an own boat's number; ``steer`` gives its order."""
+    """A primitive. ``begins`` and ``ends`` test a sight and an own boat's number; ``steer`` returns its order."""
 
     begins: Test
     ends: Test
@@ -42,12 +42,12 @@ class Option:
 
 
 def attack(sight: Sight, number: int) -> Order:
-    """Straight to the other flag."""
+    """Steer straight to the other flag."""
     return go(sight.own[number], sight.goal)
 
 
 def flank(sight: Sight, number: int) -> Order:
-    """Round the side with fewer foes: along the edge to the height of the flag, then in."""
+    """Steer round the side with fewer opponents: along the edge to the x of the flag, then in."""
     boat = sight.own[number]
     if boat.x >= sight.base[0] - sight.reach:
         return go(boat, sight.goal)
@@ -58,7 +58,7 @@ def flank(sight: Sight, number: int) -> Order:
 
 
 def avoid(sight: Sight, number: int) -> Order:
-    """Away from the nearest foe, bent off the edges."""
+    """Steer away from the nearest opponent, turned off the edges."""
     boat, foe = sight.own[number], nearest_foe(sight, number)
     x, y = ahead(boat.at, heading_to(foe.at, boat.at), sight.reach)
     inside = clip(x, EDGE_M, sight.size[0] - EDGE_M), clip(y, EDGE_M, sight.size[1] - EDGE_M)
@@ -66,7 +66,7 @@ def avoid(sight: Sight, number: int) -> Order:
 
 
 def retreat(sight: Sight, number: int) -> Order:
-    """Straight home; with the flag to where it counts."""
+    """Steer straight home; with the flag, to where it counts."""
     at = dock(sight.own[number], sight) if sight.own[number].carries else None
     if at is not None:
         return sight.own[number].top, heading_to(sight.own[number].at, at)
@@ -74,12 +74,12 @@ def retreat(sight: Sight, number: int) -> Order:
 
 
 def guard(sight: Sight, number: int) -> Order:
-    """To the boat's own station before the flag."""
+    """Steer to the boat's own station before the flag."""
     return go(sight.own[number], arc(sight)[number], 2.0)
 
 
 def tag(sight: Sight, number: int) -> Order:
-    """To meet the nearest foe that can be tagged, in the own half."""
+    """Steer to meet the nearest opponent that can be tagged, in the own half."""
     boat, foe = sight.own[number], target(sight, number)
     if foe is None:
         return STOP_MPS, boat.heading
@@ -88,12 +88,12 @@ def tag(sight: Sight, number: int) -> Order:
 
 
 def nearest_foe(sight: Sight, number: int) -> Boat:
-    """The nearest boat of the other team."""
+    """Return the nearest boat of the other team."""
     return min(sight.foes, key=lambda foe: distance(foe.at, sight.own[number].at))
 
 
 def target(sight: Sight, number: int) -> Boat | None:
-    """The nearest foe that a boat could tag: untagged and in its half; None where there is none."""
+    """Return the nearest opponent that a boat could tag: untagged and in its half; None if there is none."""
     found = [foe for foe in sight.foes if not foe.tagged and not foe.on_side]
     return min(found, key=lambda foe: distance(foe.at, sight.own[number].at), default=None)
 
@@ -121,7 +121,7 @@ def _can_tag(sight: Sight, number: int) -> bool:
 
 
 def _while(begins: Test, steer: Steer) -> Option:
-    """An option that ends when it could not begin."""
+    """Return an option that ends as soon as it could not begin."""
     return Option(begins, lambda sight, number: not begins(sight, number), steer)
 
 
@@ -134,11 +134,11 @@ OPTIONS = {
     "tag": _while(_can_tag, tag),
     "no_op": _while(lambda sight, number: True, lambda sight, number: (STOP_MPS, sight.own[number].heading)),
 }
-"""By name."""
+"""The options by name."""
 
 
 def check_option(name: str) -> str:
-    """Return the name."""
+    """Return the name; refuse an unknown one."""
     if name not in OPTIONS:
         raise PolicyError(f"unknown option {name!r}; choose from {', '.join(OPTIONS)}")
     return name
@@ -146,25 +146,25 @@ def check_option(name: str) -> str:
 
 @dataclass(frozen=True)
 class Choice:
-    """The option one boat follows, and the game time at which it was chosen, s."""
+    """A boat's option, and the game time of its choice, s."""
 
     option: str
     since_s: float
 
     def ended(self, sight: Sight, number: int) -> bool:
-        """Whether it is over: by its own test, or after `LONGEST_S`."""
+        """Return whether it has ended: by its own test, or after `LONGEST_S`."""
         return OPTIONS[self.option].ends(sight, number) or sight.time - self.since_s >= LONGEST_S
 
 
 def next_option(sight: Sight, number: int, wish: str) -> str:
-    """What a boat does that wishes for an option: that if it may begin, home with a flag, else guard or nothing."""
+    """Return a boat's next option: with a flag retreat, else the wished one or guard if it may begin, or no-op."""
     if sight.own[number].carries:
         return "retreat"
     return next((name for name in (wish, "guard") if OPTIONS[name].begins(sight, number)), "no_op")
 
 
 def row_of(sight: Sight, number: int, choice: Choice) -> dict[str, Any]:
-    """One boat at one moment: the option it follows, and the sight it was chosen at, in the own-end frame.
+    """Return one boat's option and what it sees, in the own-end frame.
 
     Returns:
         ``time_s``, ``boat``, ``option``, ``since_s``, ``own_*`` of the boat itself, ``mate{k}_*`` and ``foe{k}_*`` of
@@ -179,29 +179,29 @@ def row_of(sight: Sight, number: int, choice: Choice) -> dict[str, Any]:
 
 
 class OptionPlayer(EntrantTeam):
-    """Chooses an option for each boat once a second; subclasses say which in `wish`."""
+    """Chooses an option for each boat once a second; subclasses choose in `wish`."""
 
     def begin(self, sight: Sight) -> None:
-        """All guard, until the first look."""
+        """Let all boats guard until the first choice."""
         self._next_s = sight.time
         self._choices = [Choice("guard", sight.time) for _ in sight.own]
 
     def decide(self, sight: Sight) -> list[Order]:
-        """Choose where it is time, end what is over, follow."""
+        """Choose if it is time, end options that are over, and follow them."""
         if sight.time >= self._next_s - 1e-9:
             self._next_s = sight.time + EVERY_S
             self.look_round(sight)
         return self.follow(sight)
 
     def follow(self, sight: Sight) -> list[Order]:
-        """What the options order; where one is over the boat guards."""
+        """Return the options' orders; a boat whose option has ended guards."""
         for number, choice in enumerate(self._choices):
             if choice.ended(sight, number):
                 self._choices[number] = Choice(next_option(sight, number, "guard"), sight.time)
         return [OPTIONS[choice.option].steer(sight, number) for number, choice in enumerate(self._choices)]
 
     def look_round(self, sight: Sight) -> None:
-        """Choose for every boat."""
+        """Choose an option for every boat."""
         for number, choice in enumerate(self._choices):
             name = next_option(sight, number, self.wish(sight, number))
             if name != choice.option:
@@ -209,18 +209,18 @@ class OptionPlayer(EntrantTeam):
 
     @abstractmethod
     def wish(self, sight: Sight, number: int) -> str:
-        """The option a boat wishes for."""
+        """Return the option that a boat wishes for."""
 
 
 @entrant("options", "one of Crowley-BU-LL's primitives per boat (boats='attack,flank,guard')")
 class OptionsTeam(EntrantTeam):
-    """Plays a given option per boat; a boat whose option cannot begin guards, one with the flag returns.
+    """Plays a given option per boat. A boat whose option cannot begin guards; one with the flag returns.
 
     Args:
         boats: names of options, one for all boats or one per boat.
 
     Raises:
-        PolicyError: an unknown option; the wrong number is reported once the team's size is known.
+        PolicyError: an unknown option; a wrong number of them is reported once the team's size is known.
     """
 
     name = "options"
@@ -231,7 +231,7 @@ class OptionsTeam(EntrantTeam):
         self._given = [check_option(str(word).strip()) for word in words]
 
     def begin(self, sight: Sight) -> None:
-        """Hand out the options."""
+        """Assign the options."""
         if len(self._given) not in (1, len(sight.own)):
             raise PolicyError(
                 f"boats names {len(self._given)} options for {len(sight.own)} boats; give one or one each"
@@ -240,7 +240,7 @@ class OptionsTeam(EntrantTeam):
         self._choices = [Choice("no_op", -math.inf) for _ in sight.own]
 
     def decide(self, sight: Sight) -> list[Order]:
-        """Follow the options, begin anew those that ended."""
+        """Follow the options; restart those that have ended."""
         for number, choice in enumerate(self._choices):
             wanted = next_option(sight, number, self._wishes[number])
             if choice.ended(sight, number) or wanted != choice.option:

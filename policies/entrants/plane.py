@@ -1,4 +1,4 @@
-"""Plane geometry of the entrants: headings, meeting points, crossing paths, stations and who takes which."""
+"""Plane geometry of the entrants: headings, meeting points, crossing paths, stations and their assignment."""
 
 from __future__ import annotations
 
@@ -13,38 +13,38 @@ Order = tuple[float, float]
 """Speed m/s and absolute heading rad in the own-end frame."""
 STOP_MPS = 0.0
 GAP_M = 9.0
-"""Between neighbouring stations: more than the largest collision radius of the presets."""
+"""Distance between neighbouring stations: more than the largest collision radius of the presets."""
 SLOWING_M, SLOWEST = 10.0, 0.25
-"""Way over which a boat slows down before a point, m, and the least share of its top speed on it."""
+"""Distance within which a boat slows down before a point, m, and the least share of its top speed there."""
 
 
 def distance(a: Point, b: Point) -> float:
-    """From a to b, m."""
+    """Return the distance from a to b, m."""
     return math.hypot(b[0] - a[0], b[1] - a[1])
 
 
 def heading_to(a: Point, b: Point) -> float:
-    """Heading from a to b, rad clockwise from north."""
+    """Return the heading from a to b, rad clockwise from north."""
     return math.atan2(b[0] - a[0], b[1] - a[1])
 
 
 def ahead(a: Point, heading: float, way: float) -> Point:
-    """The point so many metres from a along a heading."""
+    """Return the point ``way`` metres from a along a heading."""
     return a[0] + way * math.sin(heading), a[1] + way * math.cos(heading)
 
 
 def wrap(angle: float) -> float:
-    """The same angle in [-pi, pi)."""
+    """Wrap an angle into [-pi, pi)."""
     return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
 def clip(value: float, low: float, high: float) -> float:
-    """The nearest number within limits."""
+    """Limit a value to [low, high]."""
     return min(max(value, low), high)
 
 
 def go(boat: Boat, point: Point, near_m: float = 2.0) -> Order:
-    """Full speed to a point, slower on the last `SLOWING_M` (fast boats circle near points), a stop at ``near_m``."""
+    """Steer to a point: full speed, slower within `SLOWING_M` (fast boats circle near points), a stop at ``near_m``."""
     towards, way_m = heading_to(boat.at, point), distance(boat.at, point)
     if way_m <= near_m:
         return STOP_MPS, boat.heading
@@ -52,14 +52,15 @@ def go(boat: Boat, point: Point, near_m: float = 2.0) -> Order:
 
 
 def dock(boat: Boat, sight: Sight) -> Point | None:
-    """The nearest place that a flag has to be taken to; None where the own side is enough."""
+    """Return the nearest place where the flag must be brought; None if reaching the own side is enough."""
     return min(sight.docks, key=lambda point: distance(boat.at, point), default=None)
 
 
 def meeting_point(hunter: Boat, target: Boat) -> Point:
-    """Where a boat at full speed first meets one that goes on as it does.
+    """Return where a boat at full speed first meets a target on a straight course.
 
-    The least t >= 0 with |p + v t - q| = V t, a quadratic in t; where there is none, where the target is.
+    It solves |p + v t - q| = V t for the least t >= 0, a quadratic in t. Without a solution it returns the target's
+    place.
     """
     (vx, vy), px, py = target.velocity, target.x - hunter.x, target.y - hunter.y
     a, b, c = vx * vx + vy * vy - hunter.top**2, px * vx + py * vy, px * px + py * py
@@ -73,7 +74,7 @@ def meeting_point(hunter: Boat, target: Boat) -> Point:
 
 
 def cross(a: Point, b: Point, c: Point, d: Point) -> bool:
-    """Whether the paths from a to b and from c to d cross."""
+    """Return whether the paths from a to b and from c to d cross."""
 
     def side(p: Point, q: Point, r: Point) -> float:
         return (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])
@@ -82,7 +83,7 @@ def cross(a: Point, b: Point, c: Point, d: Point) -> bool:
 
 
 def arc(sight: Sight) -> list[Point]:
-    """A station per own boat, on the circle of the grab radius round the own flag, facing the dividing line."""
+    """Return a station per own boat, on the grab-radius circle round the own flag, on the side of the dividing line."""
     radius = max(sight.reach, sight.keepout + max(boat.radius for boat in sight.own) + 1.0)
     step = 2.0 * math.asin(min(GAP_M / (2.0 * radius), 1.0))
     first = 0.5 * math.pi - 0.5 * step * (len(sight.own) - 1)
@@ -90,13 +91,16 @@ def arc(sight: Sight) -> list[Point]:
 
 
 def row(sight: Sight) -> list[Point]:
-    """A station per own boat in a row across the own half, midway to the dividing line: the presets' start places."""
+    """Return a station per own boat, in a row across the own half midway to the dividing line.
+
+    These are the presets' start places.
+    """
     x, gap = 0.5 * (sight.home[0] + sight.line), sight.size[1] / (len(sight.own) + 1)
     return [(x, gap * (k + 1)) for k in range(len(sight.own))]
 
 
 def assign(starts: Sequence[Point], ends: Sequence[Point]) -> list[int]:
-    """For each start the number of its end, the sum of all distances being least; -1 where ends are fewer."""
+    """Assign ends to starts with the least sum of distances; return each start's end, -1 if ends are fewer."""
     costs = np.array([[distance(a, b) for b in ends] for a in starts])
     chosen = [-1] * len(starts)
     from scipy.optimize import linear_sum_assignment  # importing it takes a while

@@ -1,4 +1,4 @@
-"""`EntrantTeam`: what all entrants share; an entrant says what its boats do at a `Sight`."""
+"""`EntrantTeam`: base of all entrants; an entrant decides its boats' orders from a `Sight`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .sight import Sight, is_turned, look
 class EntrantTeam(ABC):
     """A `TeamPolicy` that sees the live game in its own-end frame.
 
-    Subclasses give `decide`, and `begin` where they remember something between steps.
+    Subclasses define `decide`, and `begin` if they have a memory.
 
     Attributes:
         name: for records and reports.
@@ -37,7 +37,7 @@ class EntrantTeam(ABC):
         """Begin a game.
 
         Raises:
-            PolicyError: not an `MctfEnv` (or a wrapper round one), or the boats are not one whole team.
+            PolicyError: not an `MctfEnv` (or a wrapper around one), or the boats are not one whole team.
         """
         self.core = game_core(env)
         boats = boat_numbers(self.core, agent_ids)
@@ -49,7 +49,7 @@ class EntrantTeam(ABC):
         self.begin(look(self.core, self.team))
 
     def act(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
-        """Actions (speed m/s, relative heading deg) of the boats; the arguments are not read.
+        """Return actions (speed m/s, relative heading deg) of the boats; the arguments are not read.
 
         Raises:
             PolicyError: `reset` was not called.
@@ -64,24 +64,24 @@ class EntrantTeam(ABC):
         }
 
     def begin(self, sight: Sight) -> None:  # noqa: B027 (most entrants remember nothing)
-        """Begin a game at what is seen of its start."""
+        """Begin a game, given the view of its start."""
 
     @abstractmethod
     def decide(self, sight: Sight) -> list[Order]:
-        """An order for each own boat."""
+        """Return an order for each own boat."""
 
 
 class BatchFront(EntrantTeam):
-    """A thin front over the batch policy in ``_batch``, which subclasses set."""
+    """A thin layer over the batch policy in ``_batch``, which subclasses set."""
 
     _batch: Any
 
     def begin(self, sight: Sight) -> None:
-        """Begin the batch of one."""
+        """Begin the batch of one game."""
         self._batch.reset(self.core, self.team, self.seed)
 
     def decide(self, sight: Sight) -> list[Order]:
-        """What the batch commands."""
+        """Return the commands of the batch policy."""
         commands = self._batch.act(self.core, self.team)[0].tolist()
         return [
             (speed, boat.heading + math.radians(turn)) for boat, (speed, turn) in zip(sight.own, commands, strict=True)

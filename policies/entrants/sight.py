@@ -1,7 +1,7 @@
-"""What an entrant sees: one game in its own-end frame, own flag on the left, as plain numbers.
+"""What an entrant sees: one game in its own-end frame, with the own flag on the left, as plain numbers.
 
-The frame is the field for a team whose flag is on the left, and the field turned by 180 deg for the other, so that one
-piece of play serves both sides.
+For a team with its flag on the left the frame is the field. For the other team it is the field turned by 180 deg. The
+same play therefore serves both sides.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class Boat:
-    """One boat: place m, heading rad clockwise from the frame's north, speed and top speed m/s, and its standing."""
+    """One boat: place m, heading rad clockwise from the frame's north, speed and top speed m/s, and its state."""
 
     x: float
     y: float
@@ -32,12 +32,12 @@ class Boat:
 
     @property
     def at(self) -> Point:
-        """Where it is, m."""
+        """Position, m."""
         return self.x, self.y
 
     @property
     def velocity(self) -> Point:
-        """East and north, m/s."""
+        """Velocity east and north, m/s."""
         return self.speed * math.sin(self.heading), self.speed * math.cos(self.heading)
 
 
@@ -47,18 +47,18 @@ class Sight:
 
     Attributes:
         own: the entrant's boats, in order.
-        foes: the other team's.
+        foes: the other team's boats.
         size: field, m.
         home: own flag's home, m.
-        goal: where the other flag is now, m.
-        base: where it is at home, m.
-        flag: where the own flag is now, m.
-        taken: whether a foe carries it.
+        goal: present place of the other flag, m.
+        base: home of the other flag, m.
+        flag: present place of the own flag, m.
+        taken: an opponent carries the own flag.
         reach: radius of grabs and tags, m.
-        keepout: distance from the own flag that own boats keep while it is home, without their radius, m.
-        line: the dividing line's x, m.
+        keepout: distance that own boats keep from their own flag while it is home, without their radius, m.
+        line: x of the dividing line, m.
         time: game time, s.
-        docks: where a carrier has to take the flag, m; none where the own side is enough.
+        docks: places where a carrier must bring the flag, m; empty if reaching the own side is enough.
     """
 
     own: tuple[Boat, ...]
@@ -77,12 +77,12 @@ class Sight:
 
 
 def is_turned(core: BatchedMctf, team: int) -> bool:
-    """Whether the team's flag is on the right."""
+    """Return whether the team's flag is on the right."""
     return bool(core.flag_home[team, 0] > 0.5 * core.config.env_bounds_m[0])
 
 
 def look(core: BatchedMctf, team: int, game: int = 0) -> Sight:
-    """What a team sees of a game."""
+    """Return what a team sees of a game."""
     turned, (width, height) = is_turned(core, team), core.config.env_bounds_m
 
     def place(point: list[float]) -> Point:
@@ -110,7 +110,7 @@ def look(core: BatchedMctf, team: int, game: int = 0) -> Sight:
 
 
 def docks_of(core: BatchedMctf, team: int) -> list[list[float]]:
-    """Where a team's carrier has to take the flag, in the field's own frame, m; empty where its own side is enough."""
+    """Return where a team's carrier must bring the flag, in the field's frame, m; empty if its own side is enough."""
     rules, at = core.rules, core.config.capture_at
     if at == "own_side":
         return []

@@ -1,7 +1,7 @@
 """Learned teams: networks of numpy weights, played without torch.
 
-Each of our own has its weights, the config that trains it again and its curve in ``teams/``, and is entered where its
-weights are there.
+For each of our own, ``teams/`` holds the weights, the config that trains it again, and its curve. A team is registered
+if its weights are present.
 """
 
 from __future__ import annotations
@@ -34,41 +34,44 @@ CHOOSER = TEAMS / "crowley.npz"
 
 
 def team_of(network: Network, name: str = "weights", sample: bool = False) -> LearnedTeam | RaidsTeam:
-    """A network as the team policy of its kind."""
+    """Return a network as the team policy of its kind."""
     return (RaidsTeam if network.kind == "raids" else LearnedTeam)(network, name, sample)
 
 
 def batch_of(network: Network, name: str = "weights", sample: bool = False) -> LearnedBatch | RaidsBatch:
-    """The same for a batch of games."""
+    """Return a network as the batch policy of its kind."""
     return (RaidsBatch if network.kind == "raids" else LearnedBatch)(network, name, sample)
 
 
 def load_weights(path: str | Path, sample: bool = False) -> LearnedTeam | RaidsTeam:
-    """An exported network as a team policy."""
+    """Load an exported network as a team policy."""
     return team_of(read_weights(path), Path(path).stem, sample)
 
 
 def load_weights_batch(path: str | Path, sample: bool = False) -> LearnedBatch | RaidsBatch:
-    """The same for a batch of games."""
+    """Load an exported network as a batch policy."""
     return batch_of(read_weights(path), Path(path).stem, sample)
 
 
 def load_trained(path: str | Path, sample: bool = False, interval: int | None = None) -> LearnedTeam:
-    """A model of ``steerclear train`` as a team policy: what was trained, read as numbers; see `load_sb3_batch`."""
+    """Load a model of ``steerclear train`` as a team policy, from its tensors alone; see `load_sb3_batch`."""
     from .sb3_file import read_sb3
 
     return LearnedTeam(read_sb3(path, interval), Path(path).stem, sample)
 
 
 def load_sb3_batch(path: str | Path, sample: bool = False, interval: int | None = None) -> LearnedBatch:
-    """A saved Stable-Baselines3 model for a batch of games. Its tensors alone are read: none of its pickles runs."""
+    """Load a saved Stable-Baselines3 model for a batch of games.
+
+    Only its tensors are read: none of its pickles runs.
+    """
     from .sb3_file import read_sb3
 
     return LearnedBatch(read_sb3(path, interval), Path(path).stem, sample)
 
 
 def batch_builder(name: str) -> tuple[Callable[..., Any], tuple[Any, ...]] | None:
-    """What builds the batch policy of that name, and its first arguments; None where it is no learned one."""
+    """Return the builder of a learned batch policy and its first arguments; None if the name is not one of these."""
     if name.startswith(SB3):
         return load_sb3_batch, (name.removeprefix(SB3),)
     path = name.removeprefix(WEIGHTS) if name.startswith(WEIGHTS) else FILES.get(name)
@@ -76,7 +79,7 @@ def batch_builder(name: str) -> tuple[Callable[..., Any], tuple[Any, ...]] | Non
 
 
 def learned_in(name: str) -> str:
-    """Preset that the policy of that name learned in; empty where it is no learned one, or does not say."""
+    """Return the preset in which the policy of that name learned; empty if it is not learned or does not state it."""
     from ...sb3 import read_card
 
     if name.startswith(SB3):

@@ -1,4 +1,4 @@
-"""Crowley-BU-LL: a small network over options, in numpy, and the scripted demonstrator that it was learned from."""
+"""Crowley-BU-LL: a small network over options, in numpy, and the scripted demonstrator that it learned from."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ class Chooser:
     """One hidden layer of tanh, and a value per option.
 
     Attributes:
-        names: of the numbers it looks at, columns of a demonstration.
-        middle, scale: (n,) what is taken off and multiplied with first.
+        names: of its inputs, columns of a demonstration.
+        middle, scale: (n,) subtracted from and multiplied with the inputs.
         w1, b1, w2, b2: layers, (n, hidden), (hidden,), (hidden, options), (options,).
-        card: where it comes from.
+        card: its origin.
     """
 
     names: list[str]
@@ -53,36 +53,36 @@ class Chooser:
 
     @staticmethod
     def columns(row: Mapping[str, Any]) -> list[str]:
-        """Numbers of a row that a choice may depend on."""
+        """Return the columns of a row that a choice may depend on."""
         return [name for name in row if name not in NOT_SEEN]
 
     @classmethod
     def fresh(cls, names: list[str], hidden: int, rng: np.random.Generator, card: dict[str, Any]) -> Chooser:
-        """One that has learned nothing."""
+        """Return an untrained network."""
         n, k = len(names), len(OPTION_NAMES)
         w1, w2 = rng.normal(size=(n, hidden)) / np.sqrt(n), rng.normal(size=(hidden, k)) / np.sqrt(hidden)
         return cls(names, np.zeros(n), np.ones(n), w1, np.zeros(hidden), w2, np.zeros(k), card)
 
     def scale_to(self, seen: Floats) -> None:
-        """Bring what is looked at to mean 0 and deviation 1."""
+        """Scale the inputs to mean 0 and deviation 1."""
         spread = seen.std(axis=0)
         self.middle, self.scale = seen.mean(axis=0), 1.0 / np.where(spread > 1e-9, spread, 1.0)
 
     def values(self, seen: Floats) -> Floats:
-        """Values (N, options) of sights (N, n)."""
+        """Return values (N, options) for inputs (N, n)."""
         values: Floats = np.tanh((seen - self.middle) * self.scale @ self.w1 + self.b1) @ self.w2 + self.b2
         return values
 
     def choices(self, seen: Floats) -> NDArray[np.int64]:
-        """Numbers (N,) of the options it would choose."""
+        """Return the numbers (N,) of the chosen options."""
         return np.argmax(self.values(seen), axis=1)
 
     def parameters(self) -> list[Floats]:
-        """Arrays that learning changes."""
+        """Return the arrays that learning changes."""
         return [self.w1, self.b1, self.w2, self.b2]
 
     def gradients(self, seen: Floats, chosen: NDArray[np.int64]) -> list[Floats]:
-        """Of the mean cross-entropy, in the order of `parameters`."""
+        """Return the gradients of the mean cross-entropy, in the order of `parameters`."""
         x = (seen - self.middle) * self.scale
         hidden = np.tanh(x @ self.w1 + self.b1)
         values = hidden @ self.w2 + self.b2
@@ -95,7 +95,7 @@ class Chooser:
 
 
 def write_chooser(chooser: Chooser, path: Path) -> Path:
-    """Write one, whole or not at all."""
+    """Write a chooser, completely or not at all."""
     about = {"format": FORMAT, "names": chooser.names, "options": OPTION_NAMES, "card": chooser.card}
     with whole_file(path, PolicyError) as part, part.open("wb") as file:
         arrays = {name: getattr(chooser, name) for name in ARRAYS}
@@ -104,7 +104,7 @@ def write_chooser(chooser: Chooser, path: Path) -> Path:
 
 
 def read_chooser(path: Path) -> Chooser:
-    """Read one; nothing in it is run."""
+    """Read a chooser; no code in it runs."""
     try:
         with zipfile.ZipFile(path) as archive:
             if sum(member.file_size for member in archive.infolist()) > MAX_BYTES:
@@ -122,7 +122,7 @@ def read_chooser(path: Path) -> Chooser:
 
 
 class Cloned(OptionPlayer):
-    """Chooses options as a scripted demonstrator does, by behaviour cloning.
+    """Chooses options like a scripted demonstrator, by behaviour cloning.
 
     Args:
         path: of a `Chooser`.
@@ -135,19 +135,19 @@ class Cloned(OptionPlayer):
         self._chooser: Any = read_chooser(path)
 
     def wish(self, sight: Sight, number: int) -> str:
-        """What the demonstrator would most likely choose."""
+        """Return the demonstrator's most likely choice."""
         row = row_of(sight, number, self._choices[number])
         seen = [[float(row[name]) for name in self._chooser.names]]
         return OPTION_NAMES[int(self._chooser.choices(seen)[0])]
 
 
 class Teacher(OptionPlayer):
-    """The demonstrator to clone where there are no people's demonstrations.
+    """The demonstrator, used where there are no demonstrations by people.
 
-    Boat by boat: home with the flag, tag an intruder that comes near, else flank or attack.
+    A boat with the flag goes home. Others tag an intruder that comes near, or else flank or attack.
 
     Attributes:
-        rows: what it chose at what sight, see `options.row_of`.
+        rows: its choices and what it saw, see `options.row_of`.
     """
 
     name = "teacher"
@@ -157,12 +157,12 @@ class Teacher(OptionPlayer):
         self.rows: list[dict[str, Any]] = []
 
     def look_round(self, sight: Sight) -> None:
-        """Choose, and keep what was chosen."""
+        """Choose, and store the choices."""
         super().look_round(sight)
         self.rows += [row_of(sight, number, choice) for number, choice in enumerate(self._choices)]
 
     def wish(self, sight: Sight, number: int) -> str:
-        """See the class."""
+        """Return the boat's option, see the class."""
         boat, foe = sight.own[number], target(sight, number)
         if boat.carries:
             return "retreat"
@@ -172,6 +172,6 @@ class Teacher(OptionPlayer):
 
 
 def _is_nearest(sight: Sight, number: int, foe: Boat) -> bool:
-    """Whether the boat is the nearest free own one to a foe that has come near."""
+    """Return whether the boat is the nearest free own one to an opponent that has come near."""
     ways = [distance(boat.at, foe.at) if not boat.tagged else 1e9 for boat in sight.own]
     return ways[number] == min(ways) and ways[number] < THREAT_M

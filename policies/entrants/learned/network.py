@@ -21,11 +21,12 @@ from ..undertow.shape import NAMES
 Floats = NDArray[np.float32]
 ACTIVATIONS = {"tanh": np.tanh, "relu": lambda x: np.maximum(x, 0.0)}
 KINDS = {"discrete": 17, "normalised": 2, "raids": len(NAMES)}
-"""Outputs by kind: action values; the mean of (speed, relative heading) scaled to [-1, 1]; the numbers of a raid, see
-`raids`."""
+"""Number of outputs by kind: action values; the mean of (speed, relative heading) scaled to [-1, 1]; the numbers of a
+raid, see `raids`.
+"""
 
 FORMAT, VERSION, PAIR_VERSION = "steerclear-weights", 1, 2
-"""A network with one that takes over is of the second version, which readers of the first refuse."""
+"""Network pairs use the second version, so that readers of the first refuse them."""
 TAKES_OVER = "carrying/"
 MAX_BYTES = 64 * 2**20
 """Largest unpacked size of such a file, bytes."""
@@ -36,14 +37,14 @@ UNREADABLE = (zipfile.BadZipFile, KeyError, ValueError, TypeError, OSError, EOFE
 
 @dataclass(frozen=True)
 class Features:
-    """What a network is given of an observation in [-1, 1].
+    """Inputs of a network, from an observation in [-1, 1].
 
-    Angles a are replaced by sin(pi a) and cos(pi a), since -1 and 1 are one direction; to each distance d comes
-    exp(-gain (d + 1)), which tells near ones apart.
+    Angles a become sin(pi a) and cos(pi a), since -1 and 1 are one direction. Each distance d also gives exp(-gain (d +
+    1)), which distinguishes near distances.
 
     Attributes:
         angles: numbers of the observation that are angles.
-        distances: those that are distances.
+        distances: numbers of the observation that are distances.
         gain: of the nearness, per unit of the normalised distance.
     """
 
@@ -52,15 +53,15 @@ class Features:
     gain: float
 
     def plain(self, n_obs: int) -> NDArray[np.int64]:
-        """Numbers that are passed as they are."""
+        """Return the numbers that are passed unchanged."""
         return np.setdiff1d(np.arange(n_obs), self.angles)
 
     def size(self, n_obs: int) -> int:
-        """How many features there are."""
+        """Return the number of features."""
         return n_obs + len(self.angles) + len(self.distances)
 
     def of(self, observations: Floats) -> Floats:
-        """Features (N, size) of observations (N, n_obs)."""
+        """Return features (N, size) of observations (N, n_obs)."""
         turn = np.float32(np.pi) * observations[:, self.angles]
         near = np.exp(-np.float32(self.gain) * (observations[:, self.distances] + np.float32(1.0)))
         plain = observations[:, self.plain(observations.shape[1])]
@@ -74,14 +75,14 @@ class Network:
     Attributes:
         weights: of each layer, (R, in, out) float32.
         biases: of each layer, (R, out) float32.
-        features: what it is given.
+        features: its inputs.
         activation: between layers.
         kind: one of `KINDS`.
         interval: game steps for which a decision is held.
         n_obs: length of an observation.
-        card: where it comes from, for people.
-        carrying: the network that takes over in games where a boat of the team holds the flag; None: this one goes on.
-        carriers: numbers of the observation that tell who of the team holds it; they are above 0 for who does.
+        card: its origin, for people.
+        carrying: network that takes over in games where a boat of the team holds the flag; None: this one always plays.
+        carriers: numbers of the observation that are above 0 for boats of the team that hold the flag.
     """
 
     weights: Sequence[Floats]
@@ -97,16 +98,21 @@ class Network:
 
     @property
     def preset(self) -> str:
-        """Rules of the game it learned in; empty where its card does not say."""
+        """Rules of the game it learned in; empty if its card does not state them."""
         return preset_in(self.card)
 
     @property
     def roles(self) -> int:
-        """Networks, one per role."""
+        """Number of networks, one per role."""
         return int(self.weights[0].shape[0])
 
     def outputs(self, observations: Floats, roles: NDArray[np.int64]) -> Floats:
-        """Last layer's values (N, out) for observations (N, n_obs) of boats with given places in their team (N,)."""
+        """Return the last layer's values (N, out).
+
+        Args:
+            observations: (N, n_obs).
+            roles: (N,) places of the boats in their team.
+        """
         seen = np.asarray(observations, np.float32)
         out = self._own(seen, roles)
         if self.carrying is not None and (held := self.held(seen)).any():
@@ -114,7 +120,7 @@ class Network:
         return out
 
     def held(self, observations: Floats) -> NDArray[np.bool_]:
-        """(N,) whether a boat of the team holds the flag."""
+        """Return (N,) whether a boat of the team holds the flag."""
         found: NDArray[np.bool_] = (observations[:, self.carriers] > 0.0).any(axis=1)
         return found
 
@@ -136,7 +142,7 @@ class Network:
         return x
 
     def commands(self, outputs: Floats, top_mps: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Speed m/s and relative heading deg (N, 2) that outputs ask for; the likeliest action, not a drawn one.
+        """Return speed m/s and relative heading deg (N, 2) for outputs: the most likely action, not a drawn one.
 
         Args:
             outputs: (N, out) of `outputs`.
@@ -151,19 +157,19 @@ class Network:
 
 
 def preset_in(card: Mapping[str, Any]) -> str:
-    """Rules of the game that a card names; empty where it names none."""
+    """Return the rules of the game that a card names; empty if it names none."""
     return str(card.get("preset", ""))[:40]
 
 
 def write_weights(network: Network, path: Path) -> Path:
-    """Write a network, whole or not at all."""
+    """Write a network, completely or not at all."""
     with whole_file(path, PolicyError) as part, part.open("wb") as file:
         np.savez_compressed(file, **arrays_of(network))
     return path
 
 
 def arrays_of(network: Network) -> dict[str, Any]:
-    """A network's arrays by name, its card among them."""
+    """Return a network's arrays by name, its card among them."""
     about = {
         "format": FORMAT,
         "version": VERSION if network.carrying is None else PAIR_VERSION,
@@ -201,7 +207,7 @@ def read_weights(path: str | Path) -> Network:
 
 
 def network_of(arrays: dict[str, Any]) -> Network:
-    """The network that arrays are."""
+    """Build a network from its arrays."""
     about = json.loads(str(arrays["about"]))
     _check_about(about)
     layers = range(about["layers"])
@@ -224,7 +230,7 @@ def network_of(arrays: dict[str, Any]) -> Network:
 
 
 def joined(first: Network, second: Network, carriers: Any) -> Network:
-    """A network, and one that takes over where a boat of the team holds the flag."""
+    """Join a network with one that takes over while a boat of the team holds the flag."""
     for name in ("n_obs", "kind", "interval"):
         if getattr(first, name) != getattr(second, name):
             raise ValueError(

@@ -1,4 +1,4 @@
-"""A network as a team: in every game of a batch, and in one game."""
+"""A network as a team, in every game of a batch or in one game."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from ...scripted.team import BatchTeam
 from .network import Network
 
 DISABLED = "is_disabled"
-"""The observation's key of a boat in a power play."""
+"""Key of a boat in a power play, in observations."""
 _SEED_MASK = (1 << 64) - 1
 
 
 class LearnedBatch:
-    """A `BatchPolicy` that plays a network. Each decision is held for the network's interval, as a course steered.
+    """A `BatchPolicy` that plays a network. Each decision is held for the network's interval, as a steered course.
 
     Args:
         network: the network.
         name: name for records and reports.
-        sample: draw actions with the network's probabilities instead of taking the likeliest (discrete ones only).
+        sample: draw actions with the network's probabilities instead of taking the most likely (discrete ones only).
 
     Raises:
-        PolicyError: sampling is asked of a network without probabilities.
+        PolicyError: sampling from a network without probabilities.
     """
 
     def __init__(self, network: Network, name: str = "weights", sample: bool = False) -> None:
@@ -54,7 +54,10 @@ class LearnedBatch:
         self.restart(np.ones(core.n_games, np.bool_), seed)
 
     def _known(self, core: Any) -> Any:
-        """Numbers of the observation without who is disabled, where a game tells that and the network never saw it."""
+        """Return the numbers of an observation without is_disabled.
+
+        None if the network's and the game's observations have equal length, or do not fit at all.
+        """
         if core.n_obs == self.network.n_obs:
             return None
         last = [key if isinstance(key, str) else key[1] for key in core.observation_keys]
@@ -79,23 +82,23 @@ class LearnedBatch:
             self._streams[game] = (int(seed) + int(game)) & _SEED_MASK
 
     def act(self, core: Any, team: int) -> Array:
-        """Commands (B, n_team, 2), speed m/s and relative heading deg; the array is reused by the next call."""
+        """Return commands (B, n_team, 2), speed m/s and relative heading deg; the next call reuses the array."""
         if team != self._team or core.n_games != self._out.shape[0]:
             raise PolicyError(f"policy {self.name!r} was not reset for team {team} of these games; call reset first")
         return self.answer(core.observations[:, self._boats], core.state[:, self._boats, L.HEADING])
 
     def answer(self, observations: Any, heading_deg: Array) -> Array:
-        """Commands from observations (B, n_team, n_obs) and headings (B, n_team) deg."""
+        """Return commands for observations (B, n_team, n_obs) and headings (B, n_team), deg."""
         due = np.flatnonzero(self._left == 0)
         self._out[..., 1] = (self._heading_deg - heading_deg + 180.0) % 360.0 - 180.0
-        if due.size:  # a turn that is fresh is sent as it is, as it was learned: 180 and -180 deg are different turns
+        if due.size:  # a new turn is passed unchanged, as in training: 180 and -180 deg differ
             self._out[due, :, 1] = self._decide(due, observations[due], heading_deg[due])
         self._left -= 1
         self._out[..., 0] = self._speed_mps
         return self._out
 
     def _decide(self, due: Any, observations: Any, heading_deg: Array) -> Any:
-        """Choose for the games that are due; the turns (due, n_team) deg."""
+        """Choose actions for the games that are due; return the turns (due, n_team), deg."""
         games, boats = heading_deg.shape
         observations = observations if self._seen is None else observations[..., self._seen]
         outputs = self.network.outputs(observations.reshape(games * boats, -1), np.tile(self._roles, games))
@@ -108,7 +111,7 @@ class LearnedBatch:
         return commands[..., 1]
 
     def _gumbel(self, due: Any, boats: int, actions: int) -> Any:
-        """Noise whose argmax with logits is a draw by their probabilities; each game has numbers of its own."""
+        """Return noise whose argmax with logits is a draw by their probabilities; each game has its own numbers."""
         rows = []
         for game in due:
             rng = np.random.default_rng([int(self._streams[game]), int(self._drawn[game])])
@@ -118,12 +121,15 @@ class LearnedBatch:
 
 
 def _game_words(preset: str) -> str:
-    """How to ask for the game a network learned in."""
+    """Return how to request the game in which a network learned."""
     return f"--preset {preset}, with its team_size and obstacles" if preset else "preset, team_size, obstacles"
 
 
 class LearnedTeam(BatchTeam):
-    """The same in one game: a front over `LearnedBatch`, whose arguments it takes; it sees what it is handed."""
+    """The same in one game: a layer over `LearnedBatch` with the same arguments.
+
+    It plays from the observations that it receives, not from the live game.
+    """
 
     def __init__(self, network: Network, name: str = "weights", sample: bool = False) -> None:
         super().__init__(LearnedBatch(network, name, sample))

@@ -1,8 +1,8 @@
-"""Raids whose numbers a network gives: `undertow`'s, sailed as a network says.
+"""Raids as in `undertow`, with numbers from a network.
 
-The network is told where all boats are and how the raid stands, and answers with the raid's `Shape`: a parameterised
-option (Masson, Ranchod and Konidaris 2016), held until the raid goes on, ends, or some seconds are over. All is told in
-the mirror in which the bait is at large y.
+The network's input is where all boats are and the state of the raid; its output is the raid's `Shape`. This is a
+parameterised option (Masson, Ranchod and Konidaris 2016), held until the raid changes phase, ends, or some seconds have
+passed. All input is mirrored so that the bait is at large y.
 """
 
 from __future__ import annotations
@@ -26,26 +26,26 @@ from .network import Network
 
 Numbers = NDArray[np.int64]
 IDLE_S, RAID_S = 10.0, 3.0
-"""Longest times that a shape holds while no raid is under way, and in one, s."""
+"""Longest times that a shape is held outside and during a raid, s."""
 NEAR_M, KEPT_S = 10.0, 30.0
-"""Distances below about this are told apart, m; the time that a side is kept is counted in the other, s."""
+"""Scales of the input: of near distances, m, and of the time since a side was chosen, s."""
 BOATS, SEEN = 3, 67
-"""Boats of a team; numbers that the network is told."""
+"""Boats of a team; numbers in the network's input."""
 
 
 class RaidsBatch:
-    """A `BatchPolicy` that raids as a network says.
+    """A `BatchPolicy` that raids with numbers from a network.
 
     Args:
-        network: of the kind "raids": from `seen` to units that a `Shape` is moved by.
+        network: of the kind "raids": from `seen` to the units by which a `Shape` is moved.
         name: for records and reports.
-        sample: is refused: there are no probabilities to draw with.
+        sample: refused, since there are no probabilities to draw with.
 
     Attributes:
         raids: of each game.
 
     Raises:
-        PolicyError: sampling is asked for, or the network is told other things.
+        PolicyError: sampling is requested, or the network has another input.
     """
 
     def __init__(self, network: Network, name: str = "weights", sample: bool = False) -> None:
@@ -72,13 +72,13 @@ class RaidsBatch:
         self.restart(np.ones(games, np.bool_), seed)
 
     def restart(self, chosen: BoolArray, seed: int) -> None:
-        """Begin the chosen games (B,) anew; nothing is drawn."""
+        """Begin the chosen games (B,) anew; the seed has no effect."""
         self._left[chosen], self._stays[chosen], self._stood[chosen] = 0, True, -1
         for game in np.flatnonzero(chosen):
             self.raids[game] = Raid(look(self._core, self._team, int(game)))
 
     def act(self, core: Any, team: int) -> Array:
-        """Commands (B, 3, 2), speed m/s and relative heading deg; the array is reused by the next call."""
+        """Return commands (B, 3, 2), speed m/s and relative heading deg; the next call reuses the array."""
         if team != self._team or core.n_games != self._left.size:
             raise PolicyError(f"policy {self.name!r} was not reset for team {team} of these games; call reset first")
         due = np.flatnonzero(self._left == 0)
@@ -90,11 +90,11 @@ class RaidsBatch:
         return self.steered()
 
     def advance(self, games: Numbers) -> Numbers:
-        """Go on with the raids of some games; those in which a new shape is asked for."""
+        """Advance the raids of some games; return the games in which a new shape is due."""
         return np.array([game for game in games if self._asks(int(game))], np.int64)
 
     def _asks(self, game: int) -> bool:
-        """Whether a raid went on to another phase or took the flag, or its shape has held long enough."""
+        """Return whether a raid changed phase, took the flag, or has held its shape long enough."""
         raid, before = self.raids[game], self._stood[game]
         raid.advance(look(self._core, self._team, game))
         self._stood[game] = raid.phase + len(Phase) * raid.held
@@ -109,13 +109,13 @@ class RaidsBatch:
         self._held_s[games] = self._core.time_s[games]
 
     def aim(self, games: Numbers, steps: int) -> None:
-        """Let the boats of some games steer for what their raids want, for so many game steps."""
+        """Set the points that the boats of some games steer for, for ``steps`` game steps."""
         for game in games:
             sight, raid = look(self._core, self._team, int(game)), self.raids[game]
             chart = Chart(sight, raid.upper, raid.shape)
             for number, boat in enumerate(sight.own):
                 self._stays[game, number] = boat.tagged
-                if boat.tagged:  # the game drives it
+                if boat.tagged:  # the game controls it
                     continue
                 aim = aim_of(raid, sight, chart, number)
                 self._points[game, number] = aim.point
@@ -123,7 +123,7 @@ class RaidsBatch:
         self._left[games] = steps
 
     def steered(self) -> Array:
-        """Commands (B, 3, 2) for the points that boats steer for, as `Aim.order`."""
+        """Return commands (B, 3, 2) towards the boats' points, as `Aim.order`."""
         state = self._core.state[:, self._own]
         at, size = state[..., [L.X, L.Y]], np.array(self._core.config.env_bounds_m)
         way = self._points - (size - at if self._turn_deg else at)
@@ -136,7 +136,7 @@ class RaidsBatch:
         return self._out
 
     def seen(self, games: Numbers) -> NDArray[np.float32]:
-        """What the network is told of some games (G, n)."""
+        """Return the network's input for some games (G, n)."""
         core, raids, some = self._core, [self.raids[game] for game in games], np.ix_(games, self._order)
         size, sign = np.array(core.config.env_bounds_m), -1.0 if self._turn_deg else 1.0
         mirror = np.where([raid.upper for raid in raids], 1.0, -1.0)[:, None]
@@ -164,7 +164,7 @@ class RaidsBatch:
 
 
 class RaidsTeam(BatchFront):
-    """The same in one game: a thin front over `RaidsBatch`, whose arguments it takes."""
+    """The same in one game: a thin layer over `RaidsBatch` with the same arguments."""
 
     def __init__(self, network: Network, name: str = "weights", sample: bool = False) -> None:
         super().__init__()

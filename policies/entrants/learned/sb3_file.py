@@ -1,4 +1,4 @@
-"""A Stable-Baselines3 zip as a `Network`: its tensors are read as numbers, its pickles are left alone."""
+"""Reading of a Stable-Baselines3 zip as a `Network`: only its tensors are read, never its pickles."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from .network import Features, Network
 
 PLAYABLE = ("PPO", "A2C")
 ABOUT = "steerclear."
-"""Our own tensors among a model's begin like this."""
+"""Prefix of our own tensors in a model."""
 TAKES_OVER = "takes_over"
-"""Entry of the card: the model plays only while the flag is held, and another network until then."""
+"""Entry of the card: the model plays only while the flag is held; another network plays until then."""
 REMEDY = "give a PPO or A2C zip with an MlpPolicy, or one of steerclear train"
 
 
 def read_sb3(path: str | Path, interval: int | None = None) -> Network:
-    """The actor of a saved model.
+    """Return the actor of a saved model.
 
     Args:
         path: the zip.
-        interval: game steps for which a decision is held; None: as it learned.
+        interval: game steps for which a decision is held; None: as in training.
     """
     file = Path(path).expanduser()
     if not file.is_file():
@@ -48,13 +48,13 @@ def read_sb3(path: str | Path, interval: int | None = None) -> Network:
 
 
 def add_card(file: Path | io.BytesIO, card: Mapping[str, Any]) -> None:
-    """Put a card, such as the preset a model learned in, into its zip."""
+    """Add a card to a model's zip, such as the preset it learned in."""
     with zipfile.ZipFile(file, "a") as archive:
         archive.writestr(CARD, json.dumps(dict(card)))
 
 
 def check_whole(file: Path, card: Mapping[str, Any]) -> None:
-    """Refuse a model that is half of what plays."""
+    """Refuse a model that is only one of two networks that play together."""
     if card.get(TAKES_OVER):
         raise PolicyError(
             f"{file} holds one network of two, the one that takes over while the flag is held; give final.npz or "
@@ -79,7 +79,7 @@ def _tensors(file: Path) -> dict[str, Any]:
 
 
 def _activation(saved: Mapping[str, Any]) -> str:
-    """The activation's name, from the words beside the pickled settings; SB3's default where there are none."""
+    """Return the activation's name, from the text beside the pickled settings; SB3's default if there is none."""
     words = str(saved.get("policy_kwargs", {}).get("activation_fn", "Tanh"))
     if "ReLU" in words:
         return "relu"
@@ -91,7 +91,7 @@ def _activation(saved: Mapping[str, Any]) -> str:
 def network_of_tensors(
     tensors: Mapping[str, Any], activation: str, interval: int | None, card: Mapping[str, Any]
 ) -> Network:
-    """The actor among a policy's tensors by SB3's names."""
+    """Return the actor from a policy's tensors, under SB3's names."""
     numbers = {name: np.asarray(value) for name, value in tensors.items()}
     head_w, head_b = numbers["action_net.weight"], numbers["action_net.bias"]
     own = "features_extractor.angles" in numbers
@@ -118,7 +118,10 @@ def network_of_tensors(
 
 
 def _placed(weights: list[Any], biases: list[Any], places: int) -> tuple[list[Any], list[Any]]:
-    """One network given the boat's place one-hot as a network per place: its first layer's last rows become biases."""
+    """Turn a network with one-hot input of the boat's place into one network per place.
+
+    The first layer's last rows become biases.
+    """
     first = weights[0][0]
     weights = [np.repeat(w, places, axis=0) for w in (first[None, :-places], *weights[1:])]
     return weights, [biases[0] + first[-places:], *(np.repeat(b, places, axis=0) for b in biases[1:])]
@@ -130,7 +133,7 @@ def _features(numbers: Mapping[str, Any]) -> Features:
 
 
 def _plain_layers(numbers: Mapping[str, Any]) -> tuple[list[Any], list[Any]]:
-    """Hidden layers of SB3's own extractor, (1, in, out) and (1, out)."""
+    """Return the hidden layers of SB3's own extractor, (1, in, out) and (1, out)."""
     pattern = re.compile(r"mlp_extractor\.policy_net\.(\d+)\.weight")
     order = sorted(int(m.group(1)) for m in map(pattern.fullmatch, numbers) if m)
     at = [f"mlp_extractor.policy_net.{k}" for k in order]
@@ -138,7 +141,7 @@ def _plain_layers(numbers: Mapping[str, Any]) -> tuple[list[Any], list[Any]]:
 
 
 def _role_layers(numbers: Mapping[str, Any]) -> tuple[list[Any], list[Any]]:
-    """Hidden layers of a network per role, (R, in, out) and (R, out)."""
+    """Return the hidden layers of a network per role, (R, in, out) and (R, out)."""
     count = sum(bool(re.fullmatch(r"mlp_extractor\.policy_weights\.\d+", name)) for name in numbers)
     at = "mlp_extractor.policy_"
     return [numbers[f"{at}weights.{k}"] for k in range(count)], [numbers[f"{at}biases.{k}"] for k in range(count)]

@@ -1,4 +1,4 @@
-"""Opponents that keep a habit, known ahead of time, and who stays at home to guard the flag."""
+"""Opponents that repeat their motion and can be predicted, and opponents that guard the flag at home."""
 
 from __future__ import annotations
 
@@ -9,39 +9,41 @@ from ..plane import wrap
 from ..sight import Boat, Sight
 
 SAMPLE_S = 1.0
-"""Time between two looks, s."""
+"""Time between two samples."""
 KEPT = 90
-"""Looks that are remembered."""
+"""Samples that are stored."""
 ALIKE_M, RAD_M, FRESH = 3.0, 4.0, 3
-"""Looks are alike below so many m, a turn of 1 rad counting as `RAD_M`; the last `FRESH` ones are not compared."""
+"""Samples are alike below so many m; a turn of 1 rad counts as `RAD_M`. The last `FRESH` ones are not compared."""
 LEAD, BROKEN_M = 5, 6.0
-"""An opponent that is so far from where it was expected so many looks ago has broken its habit, m."""
+"""An opponent farther than `BROKEN_M` from its place predicted `LEAD` samples ago has broken its habit, m."""
 PROVEN, WARY = 15, 45
-"""So many right expectations make a habit, and so many more for each that was wrong by then: one that leaves its way
-once is wrong at several looks, and so is not relied on for most of a game."""
+"""Right predictions that make a habit, and how many more for each wrong one so far. An opponent that leaves its way
+once gives several wrong predictions, and is not relied on for most of a game.
+"""
 TAGGED, HOME = 3, 4
-"""Columns of a look: after x, y, m, and heading, rad, whether it is tagged, and on its own side."""
+"""Columns of a sample after x, y, m, and heading, rad: it is tagged; it is on its own side."""
 
 COME_M = 3.0
-"""An opponent so far beyond the dividing line is no guard, m."""
+"""An opponent this far beyond the dividing line is no guard."""
 ROAMS_SHARE, QUIET_S = 0.3, 15.0
-"""Nor is one so near to the line, in shares of the way from there to its flag, while none of ours has been within
-`LURE_M` of the line or beyond it for so long, s: a guard goes back to its flag."""
+"""An opponent is also no guard this near to the line (share of the way to its flag), if no own boat has been within
+`LURE_M` of the line or beyond it for this time, s. A guard would have returned to its flag.
+"""
 LURE_M = 1.0
 
 Track = NDArray[np.float64]
-"""What an opponent does at the next looks, (looks, 3): x, y, m, and 1 where it is on its own side and not tagged."""
+"""Prediction of an opponent at the next samples, (samples, 3): x, y, m, and 1 if it is on its own side and untagged."""
 
 
 class Habits:
-    """What each opponent did, and whether it does it again.
+    """Past motion of each opponent, and whether it repeats it.
 
-    A look at an opponent is likened to earlier ones, and it is expected to go on as it did then, over and over. One
-    that is often right on the opponent's own side is relied on: it does the same whatever we do. Who sails at our boats
-    is soon somewhere else than expected, and is not relied on for long after that.
+    A sample of an opponent is compared with earlier ones, and the opponent is predicted to repeat what followed then.
+    An opponent with many right predictions on its own side is relied on: it does the same whatever we do. One that
+    steers at our boats soon deviates from its prediction, and is then not relied on for long.
 
     Args:
-        foes: how many opponents there are.
+        foes: number of opponents.
     """
 
     def __init__(self, foes: int) -> None:
@@ -51,7 +53,7 @@ class Habits:
         self._next_s = -np.inf
 
     def look(self, sight: Sight) -> bool:
-        """Remember this moment, where it is time for it; whether it was."""
+        """Store a sample if one is due; return whether it was."""
         if sight.time < self._next_s - 1e-6:
             return False
         self._next_s = sight.time + SAMPLE_S
@@ -63,15 +65,18 @@ class Habits:
         return True
 
     def settled(self, number: int) -> bool:
-        """Whether an opponent has kept its habit for long enough."""
+        """Return whether an opponent has kept its habit for long enough."""
         return self._kept[number] >= PROVEN
 
     def track(self, number: int, looks: int) -> Track | None:
-        """What a settled opponent will do at the next looks; None where it is not, or stands as never before."""
+        """Return the prediction of a settled opponent at the next samples.
+
+        None if it is not settled or no earlier sample is like the last one.
+        """
         return self._again(number, looks) if self.settled(number) else None
 
     def _compare(self, number: int, foe: Boat) -> None:
-        """Hold where it is, on its own side, against what was expected `LEAD` looks ago."""
+        """Compare an opponent's place, on its own side, with the prediction `LEAD` samples ago."""
         expected, looks = self._expected[number], self._looks[number][-LEAD:]
         at_home = foe.on_side and all(look[HOME] > 0.0 for look in looks)
         if not at_home or len(expected) < LEAD or expected[0] is None:
@@ -82,7 +87,7 @@ class Habits:
             self._kept[number] = -WARY * self._breaks[number]
 
     def _again(self, number: int, looks: int) -> Track | None:
-        """What followed the look most like the last one, repeated from there on."""
+        """Return what followed the sample most like the last one, repeated from there on."""
         seen = np.array(self._looks[number])
         if len(seen) <= FRESH:
             return None
@@ -99,11 +104,11 @@ class Habits:
 
 
 class Watch:
-    """Who has been where.
+    """Record of where the opponents have been.
 
     Attributes:
         habits: of the opponents.
-        nobody: none stays at home, as was remembered of the game.
+        nobody: no opponent stays at home, according to a restored memory.
     """
 
     def __init__(self, sight: Sight) -> None:
@@ -112,7 +117,7 @@ class Watch:
         self._lured_s = sight.time
 
     def look(self, sight: Sight) -> bool:
-        """Note who is where; whether habits were looked at."""
+        """Note where all boats are; return whether habits were sampled."""
         if any(boat.x > sight.line - LURE_M for boat in sight.own):
             self._lured_s = sight.time
         near = sight.line - COME_M
@@ -125,10 +130,10 @@ class Watch:
 
     @property
     def unguarded(self) -> bool:
-        """Whether every opponent has left its flag at some time, or keeps a habit whoever comes."""
+        """Whether every opponent has left its flag at some time, or repeats its motion whoever comes."""
         return self.nobody or all(number in self._left or self.habits.settled(number) for number in self._numbers)
 
     @property
     def timed(self) -> bool:
-        """Whether some opponent keeps a habit."""
+        """Whether some opponent has a habit."""
         return any(self.habits.settled(number) for number in self._numbers)

@@ -1,6 +1,6 @@
-"""A way to the flag and home that passes opponents when they are elsewhere, and how far off their reach ways keep.
+"""A way to the flag and home that passes opponents while they are elsewhere.
 
-Opponents are where their habit takes them, or sail at the boat.
+Opponents are predicted by their habit, or assumed to steer at the boat.
 """
 
 from __future__ import annotations
@@ -16,33 +16,33 @@ from ..sight import Boat, Point, Sight
 from .habits import Habits, Track
 
 STEP_M = 2.0
-"""Between the points of a way that are looked at for who can cut it off."""
+"""Distance between points of a way that are checked for opponents."""
 LOOKS = 40
-"""Points of a way that are looked at."""
+"""Number of checked points of a way."""
 ACROSS_SHARES = (0.06, 0.18, 0.29, 0.4, 0.5, 0.6, 0.71, 0.82, 0.94)
-"""Where a way may bend or come home, in shares of the field's height;"""
+"""Where a way may bend or come home, in shares of the field's height."""
 ALONG_SHARES = (0.12, 0.3, 0.5, 0.7)
-"""and in shares of the way from the line to the flag."""
+"""Where a way may bend, in shares of the distance from the line to the flag."""
 GRABS, INSIDE_M = 8, 2.0
-"""Points round the flag at which it may be grabbed, and how far they are from the field's edge, m."""
+"""Points round the flag at which it may be grabbed, and their distance from the field's edge, m."""
 ENOUGH_M = 6.0
-"""More room than this is worth no longer way, m."""
+"""More room than this does not justify a longer way."""
 ROOM_FIRST = 1000.0
-"""So many metres of a way are worth a metre of room: the shorter of two that have as much is taken."""
+"""Metres of way that a metre of room is traded for; of two ways with equal room the shorter is chosen."""
 AHEAD_S = 90
-"""Longest time that is looked ahead, s."""
+"""Longest prediction."""
 WAKES_S = 2.0
-"""So long before and after a tagged opponent is free again it is kept clear of, s."""
+"""Time before and after a tagged opponent's release during which ways avoid it."""
 
 Numbers = NDArray[np.float64]
 
 
 def slack_m(sight: Sight, boat: Boat, grab: Point, home: Point) -> float:
-    """By how much opponents that cut a boat off would miss it, m; below 0 they tag it.
+    """Return by how much opponents that try to cut a boat off would miss it, m; below 0 they tag it.
 
-    The boat sails at full speed from where it is to where it grabs the flag, and home. Opponents go by full speed for
-    that point of its way on their side that they reach best: tagged ones by way of their base, those on the boat's side
-    when it grabs, all others at once.
+    The boat sails at full speed to where it grabs the flag, and home. Opponents sail at full speed to that point of its
+    way on their side that they reach best. Tagged ones first go to their base. Those on the boat's side start when it
+    grabs the flag, all others at once.
     """
     legs = [(boat.at, grab), (grab, home)]
     points = np.concatenate([np.linspace(a, b, max(int(distance(a, b) / STEP_M), 1) + 1)[1:] for a, b in legs])
@@ -68,8 +68,8 @@ class Waters:
     Args:
         sight: the moment.
         habits: of the opponents.
-        keep_m: how far off the reach of opponents that keep a habit a way has to be, m.
-        free_m: by how much others that cut a boat off at once have to miss it, see `way.slack_m`, m.
+        keep_m: required distance of a way from the reach of opponents with a habit, m.
+        free_m: required miss distance of other opponents that try to cut the boat off, see `slack_m`, m.
     """
 
     def __init__(self, sight: Sight, habits: Habits, keep_m: float, free_m: float) -> None:
@@ -77,7 +77,7 @@ class Waters:
         self._tracks = [habits.track(number, AHEAD_S) for number in range(len(sight.foes))]
 
     def room_m(self, points: Numbers, times_s: Numbers, grabs_s: Numbers) -> Numbers:
-        """Room on ways: how much farther off opponents than asked for they keep, at the narrowest, m."""
+        """Return the room on ways: the least distance to opponents beyond the required one, m."""
         rooms = np.full(points.shape[:2], np.inf)
         for foe, track in zip(self.sight.foes, self._tracks, strict=True):
             if track is None:
@@ -89,14 +89,14 @@ class Waters:
         return nearest
 
     def _of_track_m(self, track: Track, points: Numbers, times_s: Numbers) -> Numbers:
-        """Room (W, n) from an opponent that is known ahead."""
+        """Return the room (W, n) to an opponent whose motion is predicted."""
         then = track[np.clip(np.rint(times_s).astype(int) - 1, 0, AHEAD_S - 1)]
         room_m = np.linalg.norm(points - then[..., :2], axis=-1) - self.sight.reach - self._keep_m
         found: Numbers = np.where(then[..., 2] > 0.0, room_m, np.inf)
         return found
 
     def _of_chaser_m(self, foe: Boat, points: Numbers, times_s: Numbers, grabs_s: Numbers) -> Numbers:
-        """Room (W, n) from an opponent that may do anything."""
+        """Return the room (W, n) to an opponent that may do anything."""
         at, free_s = np.array(foe.at), np.zeros_like(grabs_s) if foe.on_side else grabs_s
         if foe.tagged:
             share = max(1.0 - self.sight.reach / max(distance(foe.at, self.sight.base), 1e-9), 0.0)
@@ -116,7 +116,7 @@ class Passage:
 
     Attributes:
         room_m: see `Waters.room_m`, the least until the boat is home.
-        points: where it bends, and its end.
+        points: its bends and its end.
     """
 
     room_m: float
@@ -124,7 +124,7 @@ class Passage:
 
 
 def outward(waters: Waters, boat: Boat) -> Passage:
-    """The best way to where the flag is grabbed, on which a way home is thought of."""
+    """Return the best way to a place where the flag is grabbed, taking the way home into account."""
     found = []
     for grab in _grabs(waters.sight):
         ways = _out_ways(waters.sight, boat.at, grab)
@@ -140,7 +140,7 @@ def outward(waters: Waters, boat: Boat) -> Passage:
 
 
 def homeward(waters: Waters, boat: Boat) -> Passage:
-    """The best way to the own side for a boat that has the flag."""
+    """Return the best way to the own side for a boat with the flag."""
     ways = _home_ways(waters.sight, boat.at)
     rooms_m, long_m = _looked_at(waters, boat, ways, 0.0, carries=True)
     best = _best(rooms_m, long_m)
@@ -152,7 +152,7 @@ def _best(rooms_m: Numbers, long_m: Numbers) -> int:
 
 
 def _grabs(sight: Sight) -> list[Point]:
-    """Points in the field from which the flag can be grabbed."""
+    """Return the points in the field from which the flag can be grabbed."""
     reach_m, (width, height) = sight.reach - 1.0, sight.size
     angles = [2.0 * math.pi * k / GRABS for k in range(GRABS)]
     points = [(sight.goal[0] + reach_m * math.cos(a), sight.goal[1] + reach_m * math.sin(a)) for a in angles]
@@ -160,19 +160,19 @@ def _grabs(sight: Sight) -> list[Point]:
 
 
 def _bends(sight: Sight) -> Numbers:
-    """Points (B, 2) at which ways bend, height by height."""
+    """Return the points (B, 2) at which ways may bend, height by height."""
     along = sight.line + np.array(ALONG_SHARES) * (sight.base[0] - sight.line)
     return np.array([(x, share * sight.size[1]) for share in ACROSS_SHARES for x in along])
 
 
 def _out_ways(sight: Sight, at: Point, grab: Point) -> Numbers:
-    """Ways (W, 3, 2): straight, and with one bend."""
+    """Return ways (W, 3, 2) to a grab: straight, and with one bend."""
     bends = np.concatenate([[grab], _bends(sight)])
     return np.stack([np.broadcast_to(at, bends.shape), bends, np.broadcast_to(grab, bends.shape)], axis=1)
 
 
 def _home_ways(sight: Sight, at: Point) -> Numbers:
-    """Ways (W, 3, 2) home: straight to a place at the line, and with a bend at its height."""
+    """Return ways (W, 3, 2) home: straight to a place at the line, and with a bend at its height."""
     ends = np.array([(sight.line - 1.0, share * sight.size[1]) for share in ACROSS_SHARES])
     bends = np.concatenate([ends, _bends(sight)])
     ends = np.concatenate([ends, np.repeat(ends, len(ALONG_SHARES), axis=0)])
@@ -180,7 +180,7 @@ def _home_ways(sight: Sight, at: Point) -> Numbers:
 
 
 def _looked_at(waters: Waters, boat: Boat, ways: Numbers, from_s: float, carries: bool) -> tuple[Numbers, Numbers]:
-    """Room (W,) on ways (W, 3, 2) that are begun after some time at full speed, and their lengths (W,), m."""
+    """Return the room (W,) on ways (W, 3, 2) begun at a time at full speed, and their lengths (W,), m."""
     legs_m = np.linalg.norm(np.diff(ways, axis=1), axis=-1)
     long_m = legs_m.sum(axis=1)
     gone_m = np.linspace(1.0 / LOOKS, 1.0, LOOKS) * long_m[:, None]

@@ -1,4 +1,4 @@
-"""A raid: where it leads, its phases, and when each gives way to the next."""
+"""A raid: its ways, its phases, and when they change."""
 
 from __future__ import annotations
 
@@ -16,24 +16,25 @@ from .shape import SCRIPTED, WIDE_M, Shape
 BAIT, DRAG, RUN = 0, 1, 2
 """Numbers of the boats by their part."""
 LONGEST_S, AGAIN_S = 60.0, 15.0
-"""Longest time for a raid, and how much a success takes off the time that a side is kept, s."""
+"""Longest time of a raid, and how much a success takes off the time that a side is kept, s."""
 KEEP_M, MOVES_S = 2.0, 20.0
-"""The third boat sets out when it will keep so far off the reach of opponents that keep a habit, m; and waits elsewhere
-after so long, s."""
+"""Required distance of the third boat's way from the reach of opponents with a habit when it starts, m; and the time
+after which it waits elsewhere, s.
+"""
 GRABS_DEG = (0.0, 30.0, 60.0)
-"""Where a boat that sails alone may grab: round the flag, from before it towards its edge."""
+"""Where a lone boat may grab: angles round the flag, from before it towards the boat's edge."""
 
 WAIT_SHARES = (0.15, 0.5, 0.85, 0.5)
-"""Where a boat that waits for a passage does so, in shares of the field's height."""
+"""Where a boat waits for a passage, in shares of the field's height."""
 
 
 @dataclass(frozen=True)
 class Chart:
-    """Points for a raid.
+    """Points of a raid.
 
     Attributes:
         sight: the moment.
-        upper: whether the bait is at the edge of large y; else everything is mirrored.
+        upper: the bait is at the edge of large y; otherwise everything is mirrored.
         shape: its numbers.
     """
 
@@ -42,11 +43,11 @@ class Chart:
     shape: Shape = SCRIPTED
 
     def at(self, x: float, y: float) -> Point:
-        """A point given with the bait at the upper edge, m."""
+        """Return a point given for the bait at the upper edge, m."""
         return (x, y) if self.upper else (x, self.sight.size[1] - y)
 
     def height(self, point: Point) -> float:
-        """Its y with the bait at the upper edge, m."""
+        """Return a point's y as if the bait were at the upper edge, m."""
         return self.at(*point)[1]
 
     @property
@@ -70,7 +71,7 @@ class Chart:
         return self.at(self.sight.line - self.shape.door_x_m, self.sight.size[1] - self.shape.door_m)
 
     def drag(self, at: Point) -> Point:
-        """What the second boat steers for: along its edge, round the far corner, then the flag."""
+        """Return the second boat's point: along its edge, round the far corner, then the flag."""
         base, shape = self.sight.base, self.shape
         if at[0] < base[0] - shape.corner_x_m:
             return self.at(at[0] + 12.0, shape.drag_m)
@@ -79,7 +80,7 @@ class Chart:
         return self.sight.goal
 
     def run(self, at: Point) -> Point:
-        """What the third boat steers for: past the flag on the bait's side, to turn home away from the guard."""
+        """Return the third boat's point: past the flag on the bait's side, to turn home away from the guard."""
         base, shape = self.sight.base, self.shape
         if at[0] < self.sight.line + shape.run_x_m:
             return self.at(at[0] + 8.0, base[1] + shape.run_m)
@@ -91,11 +92,11 @@ class Chart:
         return self.at(self.sight.line - 2.0, self.sight.size[1] - self.shape.edge_m)
 
     def wait(self, place: int) -> Point:
-        """Where the third boat waits for a passage: in turn at one edge, in the middle and at the other."""
+        """Return where the third boat waits for a passage: in turn at one edge, in the middle and at the other."""
         return self.sight.line - 2.0, WAIT_SHARES[place % len(WAIT_SHARES)] * self.sight.size[1]
 
     def dash(self, boat: Boat) -> tuple[Point, float]:
-        """Where a boat that sails alone grabs the flag, and by how much opponents would miss it, m."""
+        """Return where a lone boat grabs the flag, and by how much opponents would miss it, m."""
         (x, y), reach_m, height_m = self.sight.base, self.sight.reach - 1.0, self.sight.size[1]
         found = []
         for angle in map(math.radians, GRABS_DEG):
@@ -107,12 +108,12 @@ class Chart:
         return grab, slack
 
     def home(self, at: Point, up: bool) -> Point:
-        """What a boat with the flag steers for: its own side, bearing off to the bait's edge or the other."""
+        """Return the point of a boat with the flag: towards its own side, and to the bait's edge or the other."""
         off_m = self.shape.home_m if up else -self.shape.drag_home_m
         return at[0] - 15.0, clip(at[1] + (off_m if self.upper else -off_m), 2.5, self.sight.size[1] - 2.5)
 
     def is_open(self, others: list[Point], clear_m: float) -> bool:
-        """Whether opponents other than the guard are so clear of all ways, m."""
+        """Return whether opponents other than the guard are farther than ``clear_m`` from all ways."""
         line, top, base, shape = self.sight.line, self.sight.size[1], self.sight.base, self.shape
         ways = (
             (self.at(line + 1.0, shape.drag_m), self.at(base[0] + 2.0, shape.drag_m)),
@@ -122,7 +123,7 @@ class Chart:
 
 
 def off(point: Point, a: Point, b: Point) -> float:
-    """Distance of a point from the line between a and b, m."""
+    """Return the distance of a point from the segment between a and b, m."""
     along = b[0] - a[0], b[1] - a[1]
     share = ((point[0] - a[0]) * along[0] + (point[1] - a[1]) * along[1]) / (along[0] ** 2 + along[1] ** 2)
     share = clip(share, 0.0, 1.0)
@@ -130,7 +131,7 @@ def off(point: Point, a: Point, b: Point) -> float:
 
 
 class Phase(IntEnum):
-    """What a team is at."""
+    """Phase of a raid."""
 
     GATHER = 0
     BAIT = 1
@@ -139,19 +140,19 @@ class Phase(IntEnum):
 
 
 class Raid:
-    """Where a team is in its raid.
+    """State of a team's raid.
 
     Attributes:
-        phase: what it is at.
+        phase: its phase.
         upper: see `Chart`.
-        bait_taken: whether the bait was tagged since the second boat set out.
-        held: whether the flag was held in this raid.
-        kept_s: since when this chart is kept, s.
+        bait_taken: the bait was tagged since the second boat started.
+        held: the flag was held in this raid.
+        kept_s: time since when this side is kept, s.
         watch: who stays at home.
-        unguarded: whether nobody stays there to guard the flag.
-        passage: of the third boat past opponents that keep a habit; None while there is none.
+        unguarded: nobody stays at home to guard the flag.
+        passage: of the third boat past opponents with a habit; None if there is none.
         place: number of the place where it waits for one, see `Chart.wait`.
-        shape: its numbers; the script's for a field of this size, until others are given.
+        shape: its numbers; the script's, scaled to the field, until others are given.
     """
 
     def __init__(self, sight: Sight) -> None:
@@ -163,19 +164,19 @@ class Raid:
         self.place = 0
 
     def memory(self, time_s: float) -> list[float]:
-        """What it remembers but for its shape, as numbers; times count from ``time_s``."""
+        """Return its memory, without the shape, as numbers; times are relative to ``time_s``."""
         times = [self._since_s - time_s, self.kept_s - time_s]
         return [self.phase, self.upper, self.bait_taken, self.held, *times, self.unguarded]
 
     def remember(self, memory: Sequence[float], time_s: float, mirrored: bool) -> None:
-        """Go on with what `memory` told, in a game that is the same, or the same in a mirror."""
+        """Restore what `memory` returned, in the same game or its mirror image."""
         self.phase, self.upper = Phase(int(memory[0])), bool(memory[1]) != mirrored
         self.bait_taken, self.held = bool(memory[2]), bool(memory[3])
         self._since_s, self.kept_s = memory[4] + time_s, memory[5] + time_s
         self.unguarded = self.watch.nobody = bool(memory[6])
 
     def advance(self, sight: Sight) -> Chart:
-        """Look at the game, go on to the next phase or give up; where the raid leads."""
+        """Advance the raid by one look at the game: next phase, or give up; return its chart."""
         looked = self.watch.look(sight)
         if self.unguarded != self.watch.unguarded:
             self.unguarded = self.watch.unguarded
@@ -190,7 +191,7 @@ class Raid:
         return Chart(sight, self.upper, self.shape)
 
     def _countered(self, sight: Sight, chart: Chart) -> None:
-        """The third boat sails alone, while no opponent can cut it off in time."""
+        """Send the third boat alone while no opponent can cut it off in time."""
         run, shape = sight.own[RUN], self.shape
         kept_at_home = self._kept_at_home(sight)
         self.passage = None
@@ -205,7 +206,7 @@ class Raid:
         self._brought_home(sight)
 
     def _timed(self, sight: Sight, looked: bool) -> None:
-        """The third boat sails alone, past opponents that keep a habit when they are elsewhere."""
+        """Send the third boat alone past opponents with a habit, while they are elsewhere."""
         if self._kept_at_home(sight):
             self.phase, self.passage = Phase.GATHER, None
         elif looked:
@@ -218,7 +219,7 @@ class Raid:
         self._brought_home(sight)
 
     def _passage(self, sight: Sight) -> Passage | None:
-        """The third boat's best way as things stand; None where it had better not go."""
+        """Return the third boat's best way at present; None if it should not go."""
         run, shape = sight.own[RUN], self.shape
         if run.carries:
             return homeward(Waters(sight, self.watch.habits, KEEP_M, shape.kept_free_m), run)
@@ -227,12 +228,12 @@ class Raid:
         return found if found.room_m > 0.0 else None
 
     def _kept_at_home(self, sight: Sight) -> bool:
-        """Whether the third boat has no choice, or has to mind the own flag."""
+        """Return whether the third boat is tagged or must protect the own flag."""
         run = sight.own[RUN]
         return run.tagged or (sight.taken and run.on_side and not run.carries)
 
     def _raided(self, sight: Sight, chart: Chart) -> None:
-        """Three boats sail, to draw a guard away."""
+        """Send three boats to draw a guard away."""
         shape = self.shape
         taggers = [foe for foe in sight.foes if may_tag(foe, sight)]
         guard = guard_of(taggers, sight)
@@ -266,7 +267,7 @@ class Raid:
         return drag.tagged and (self.phase == Phase.DRAG or (run.on_side and run.x < sight.line - 1.0))
 
     def _brought_home(self, sight: Sight) -> None:
-        """End a raid once the flag was held and is no more."""
+        """End a raid once the flag was held and no longer is."""
         if sight.own[DRAG].carries or sight.own[RUN].carries:
             self.held = True
         elif self.held and self.phase > Phase.GATHER:
@@ -287,11 +288,11 @@ class Raid:
 
 
 def may_tag(foe: Boat, sight: Sight) -> bool:
-    """Whether a boat on its own side may tag, or soon will: near its base a tagged one is free again in a moment."""
+    """Return whether a boat on its own side may tag, now or soon: near its base a tagged one is free in a moment."""
     return foe.on_side and (not foe.tagged or distance(foe.at, sight.base) <= 1.4 * sight.reach)
 
 
 def guard_of(taggers: list[Boat], sight: Sight) -> Boat | None:
-    """The one nearest to where a guard stands, before its flag."""
+    """Return the opponent nearest to where a guard stands, before its flag."""
     before = sight.base[0] - 1.3 * sight.reach, sight.base[1]
     return min(taggers, key=lambda foe: distance(foe.at, before), default=None)

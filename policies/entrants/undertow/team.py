@@ -1,4 +1,4 @@
-"""The team: what each boat steers for, phase by phase of a raid, and between raids."""
+"""The team: the point that each boat steers for, in the phases of a raid and between raids."""
 
 from __future__ import annotations
 
@@ -14,32 +14,32 @@ from ..sight import Boat, Point, Sight
 from .raid import BAIT, DRAG, RUN, Chart, Phase, Raid
 
 REACHED_M = 2.0
-"""A bend of a way is reached this near to it, m."""
+"""Distance at which a bend of a way counts as reached."""
 COMING_M = 5.0
-"""Opponents up to so far before the dividing line are taken for intruders, m."""
+"""Distance before the dividing line from which opponents count as intruders."""
 
 
 @dataclass(frozen=True)
 class Aim:
-    """What a boat steers for.
+    """The point that a boat steers for.
 
     Attributes:
         point: in the own-end frame, m.
-        near_m: it slows down on the last metres and stops so near to the point, m; None: full speed all the way.
+        near_m: the boat slows down near the point and stops at this distance, m; None: full speed all the way.
     """
 
     point: Point
     near_m: float | None = None
 
     def order(self, boat: Boat) -> Order:
-        """How a boat steers for it."""
+        """Return the order that steers a boat to the point."""
         if self.near_m is None:
             return boat.top, heading_to(boat.at, self.point)
         return go(boat, self.point, self.near_m)
 
 
 def aim_of(raid: Raid, sight: Sight, chart: Chart, number: int) -> Aim:
-    """What an own boat steers for: home with the flag, its part in the raid, or else intruders and its post."""
+    """Return an own boat's aim: home with the flag, its part in the raid, or else intruders and its post."""
     boat = sight.own[number]
     sails = number == RUN and raid.passage is not None
     if boat.carries:
@@ -56,7 +56,7 @@ def aim_of(raid: Raid, sight: Sight, chart: Chart, number: int) -> Aim:
 
 
 def _part(raid: Raid, sight: Sight, chart: Chart, number: int) -> Aim | None:
-    """A boat's part in the raid; None where it has none now."""
+    """Return a boat's part in the raid; None if it has none at present."""
     at, phase = sight.own[number].at, raid.phase
     if number == BAIT:
         return None if raid.bait_taken else Aim(chart.bait, 0.5)
@@ -70,7 +70,7 @@ def _part(raid: Raid, sight: Sight, chart: Chart, number: int) -> Aim | None:
 
 
 def _alone(raid: Raid, sight: Sight, chart: Chart, number: int) -> Aim:
-    """While no opponent stays at home: the third boat waits and sails alone, the others guard."""
+    """Return a boat's aim while no opponent stays at home: the third waits and sails alone, the others guard."""
     boat = sight.own[number]
     if number != RUN or (sight.taken and boat.on_side):
         return _before_flag(raid, sight, chart)[number]
@@ -80,7 +80,7 @@ def _alone(raid: Raid, sight: Sight, chart: Chart, number: int) -> Aim:
 
 
 def _before_flag(raid: Raid, sight: Sight, chart: Chart) -> dict[int, Aim]:
-    """Guards meet who has the flag; else each stands between the flag and another intruder, or sails at it."""
+    """Return the guards' aims: the carrier of the flag; else stand between the flag and an intruder, or steer at it."""
     run, radius = sight.own[RUN], chart.shape.guard_m
     if sight.taken:
         foe = min(sight.foes, key=lambda one: distance(one.at, sight.flag))
@@ -98,24 +98,24 @@ def _before_flag(raid: Raid, sight: Sight, chart: Chart) -> dict[int, Aim]:
 
 
 def _next_of(raid: Raid, boat: Boat) -> Point:
-    """The first bend of the raid's passage that the boat has not reached yet."""
+    """Return the first bend of the raid's passage that the boat has not reached yet."""
     assert raid.passage is not None
     points = raid.passage.points
     return next((point for point in points if distance(boat.at, point) > REACHED_M), points[-1])
 
 
 def _towards(a: Point, b: Point, far_m: float) -> Point:
-    """So far from a towards b, m; at b where that is nearer."""
+    """Return the point ``far_m`` from a towards b, m; b itself if that is nearer."""
     return ahead(a, heading_to(a, b), min(far_m, distance(a, b)))
 
 
 def _inside(point: Point, sight: Sight) -> Point:
-    """The nearest point well on the own side."""
+    """Return the nearest point well on the own side."""
     return clip(point[0], 3.0, sight.line - 1.5), clip(point[1], 3.0, sight.size[1] - 3.0)
 
 
 def _guarding(sight: Sight, chart: Chart, number: int) -> Aim:
-    """The nearest intruder, if no mate is nearer to it; else the post."""
+    """Return the nearest intruder if no teammate is nearer to it; otherwise the post."""
     boat = sight.own[number]
     intruders = [foe for foe in sight.foes if not foe.on_side and not foe.tagged]
     foe = min(intruders, key=lambda one: distance(one.at, boat.at), default=None)
@@ -136,13 +136,13 @@ class Undertow(EntrantTeam):
     name = "undertow"
 
     def begin(self, sight: Sight) -> None:
-        """No raid yet."""
+        """Begin a game without a raid."""
         if len(sight.own) < 3:
             raise PolicyError(f"entrant {self.name!r} needs three boats, the team has {len(sight.own)}; give it three")
         self._raid = Raid(sight)
 
     def decide(self, sight: Sight) -> list[Order]:
-        """Each boat's part of the raid."""
+        """Return each boat's order in the raid."""
         chart = self._raid.advance(sight)
         return [
             (STOP_MPS, boat.heading) if boat.tagged else aim_of(self._raid, sight, chart, number).order(boat)
