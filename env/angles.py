@@ -9,7 +9,7 @@ from steerclear.shield.jit import lean_kernel
 
 @lean_kernel
 def wrap_bearing(angle_deg: float) -> float:
-    """Wrap an angle in [-540, 540] into (-180, 180]; straight astern is +180, as in the reference simulator."""
+    """Wrap an angle in [-360, 360] into (-180, 180]; straight astern is +180, as in the reference simulator."""
     if angle_deg > 180.0:
         return angle_deg - 360.0
     if angle_deg <= -180.0:

@@ -82,8 +82,8 @@ class Games(NamedTuple):
     contact: Annotated[BoolArray, "n", "n"]  # pairs in touch after the last step
     power_start: Annotated[IntArray, 2]  # decision at which a team's power play begins, -1 for none
     power_boats: Annotated[IntArray, 2, 2]  # boats it disables: the first, and one more if it begins twice
-    power_begun: Annotated[IntArray, 2]  # how often it began
-    flag_position: Annotated[Array, 2, 2]  # how often it has begun
+    power_begun: Annotated[IntArray, 2]  # how often it has begun
+    flag_position: Annotated[Array, 2, 2]  # m
     flag_taken: Annotated[BoolArray, 2]  # the flag of that team is carried by an opponent
     captures: Annotated[IntArray, 2]
     grabs: Annotated[IntArray, 2]

@@ -1,7 +1,8 @@
 """Commands that every boat will obey, decided before anything moves; the game itself steers some boats.
 
-The game steers a tagged boat straight to its own flag's home, or to the nearer corner of its side, and past obstacles
-in the way. It steers an out-of-bounds boat straight off the nearest edge. It stops the engine of a disabled boat.
+The game steers a tagged boat straight to its own flag's home, or to the nearer corner of its side.
+`heading_past_obstacles` leads it past obstacles. It steers an out-of-bounds boat straight off the nearest edge. A
+disabled boat gets speed 0 and coasts.
 """
 
 from __future__ import annotations

@@ -139,7 +139,7 @@ class Ohto(EntrantTeam):
     """Holds its start places near the base: in the paper and in the presets a row across the own half.
 
     Our additions: if a game starts boats elsewhere, they first steer to the places of that row, by least total
-    distance, and hold there for the rest of the game.
+    distance. There they hold for the rest of the game.
     """
 
     name = "ohto"

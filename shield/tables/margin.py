@@ -91,9 +91,8 @@ def value_loss(
     each of `MANNERS` in turn. With a cooperative table both play the joint optimum.
 
     Returns:
-        Number of runs, separation violations (below the radius), the smallest extra value, m, from which no run
-        violated the separation (``margin_m``), and how far below its first value a run came: median and largest
-        (``loss_m``).
+        Number of runs and of separation violations (below the radius); the smallest extra value, m, from which no run
+        violated it (``margin_m``); how far below its first value a run came, median and largest (``loss_m``).
     """
     card = table.card
     boats = boats or (get_platform(card.own), get_platform(card.other))

@@ -67,8 +67,8 @@ def solve(
 ) -> Progress:
     """Solve the game by value iteration.
 
-    V starts at min(range, cap). Each iteration lowers it to the max over own rudders of the min over the other's (max
-    over both if it cooperates) of min(closest distance in the step, V after it). The iteration ends when nothing
+    V starts at min(range, cap). Each iteration lowers it to max over own rudders, min over the other's, of min(closest
+    distance in the step, V after it). If the other cooperates, it is max over both. The iteration ends when nothing
     changes or the horizon is reached. The result does not depend on the number of threads.
 
     Args:

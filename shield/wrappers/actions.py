@@ -69,11 +69,9 @@ def read_action(seat: Seat, action: Any) -> Command:
 
 def plain_action(seat: Seat, action: Any) -> int | str | Command:
     """Return an action in its plainest form: a number 0..16, a field point's name (not looked up) or two floats."""
-    if (
-        type(action) is int and seat.lowest <= action <= STOP and not seat.numbered
-    ):  # fast path: what most policies send
+    if type(action) is int and seat.lowest <= action <= STOP and not seat.numbered:  # most policies send these,
         return action % len(DISCRETE)
-    if _is_plain_pair(action):  # fast path: what the scripted policies send
+    if _is_plain_pair(action):  # the scripted ones these
         return action
     if isinstance(action, np.ndarray) and action.ndim == 0 and action.dtype.kind in "OU":
         action = action.item()

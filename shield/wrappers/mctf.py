@@ -64,9 +64,7 @@ class MctfReader:
         controlled = (core.team == team) & ~core.is_disabled[0]
         if not shield_autopilot:
             driven = core.is_tagged[0] | core.oob[0]
-            if (
-                core.config.n_obstacles > 0
-            ):  # between steps, core.driven is that of the last step; only it holds boats that hit obstacles
+            if core.config.n_obstacles > 0:  # only core.driven, of the last step, holds boats that hit obstacles
                 driven = driven | core.driven[0]
             controlled = controlled & ~driven
         rows = driven_boats(core)

@@ -35,7 +35,7 @@ class GameReader(Protocol):
         """While inside, commands (n, 2) pass ``safe`` before the boats move. The game is restored afterwards."""
 
     def check_answers(self, agent_ids: Sequence[str]) -> None:
-        """Check that the game accepts the answers of a shield around a policy: one command per action.
+        """Check that the game accepts the answers of a shield around a policy: one command per step.
 
         Raises:
             ConfigError: it does not.

@@ -28,12 +28,12 @@ class Stepped(NamedTuple):
     """Outcome of a step for the L = games * boats learners."""
 
     observations: NDArray[np.float32]  # (L, n_obs) float32, of the new game where one ended
-    rewards: Array  # (L, n_obs); of the new game where one ended
+    rewards: Array  # (L,)
     terminated: BoolArray  # (L,) the game was won
-    truncated: BoolArray  # (L,) the game won
-    final_observations: NDArray[np.float32]  # (L,) the time ran out
-    events: Mapping[str, Array] = {}  # (L, n_obs) before a new game began; only rows of ended games matter
-    # events of the decision, by name of `tallies.EVENTS`, each (L,)
+    truncated: BoolArray  # (L,) its time was over
+    final_observations: NDArray[np.float32]  # (L, n_obs) before a new game began; only rows of ended games matter
+    events: Mapping[str, Array] = {}  # events of the decision, by name of `tallies.EVENTS`, each (L,)
+    # totals of the current games, ended ones included, each (L,): ``r`` reward, ``l`` decisions, ``t`` s since the
     # batch was made, and the names of `tallies.EVENTS`
     episodes: Mapping[str, Array] = {}
 

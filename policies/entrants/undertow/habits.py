@@ -26,8 +26,10 @@ TAGGED, HOME = 3, 4
 COME_M = 3.0
 """An opponent this far beyond the dividing line is no guard."""
 ROAMS_SHARE, QUIET_S = 0.3, 15.0
-"""An opponent is also no guard this near to the line (share of the way to its flag), if no own boat has been within
-`LURE_M` of the line or beyond it for this time, s. A guard would have returned to its flag.
+"""Limits for an opponent that is no guard: near the line (share of the way to its flag), and time, s.
+
+It is no guard if it is this near while no own boat has been within `LURE_M` of the line or beyond it for this time. A
+guard would have returned to its flag.
 """
 LURE_M = 1.0
 
