@@ -53,12 +53,7 @@ def action_space(kind: str, max_speed_mps: float, n_points: int) -> Space[Any]:
 
 
 def discrete_commands(indices: np.ndarray, max_speed_mps: Array) -> Array:
-    """Return commands (..., n, 2), speed m/s and relative heading deg, of discrete actions (..., n).
-
-    Args:
-        indices: whole numbers 0..16.
-        max_speed_mps: (n,) top speeds, m/s.
-    """
+    """Return commands (..., n, 2), m/s and relative deg, of discrete actions (..., n); top speeds are (n,), m/s."""
     try:
         given = numbers(indices)
     except NoNumbersError:

@@ -135,13 +135,8 @@ def see_boat(state: Array, seen: Array) -> None:
 def place_boats(rules: Rules, games: Games, seen: Array, first: int, last: int) -> None:
     """Do what `move_boats` does for boats that something else moves.
 
-    Args:
-        rules: the rules.
-        games: the games.
-        seen: (B, n, 4) x m, y m, heading deg, speed m/s at this moment; a boat whose position is NaN is on no side and
-            out of bounds.
-        first: first game.
-        last: one past the last game.
+    ``seen`` (B, n, 4) is x m, y m, heading deg, speed m/s. A boat whose position is NaN is on no side and out of
+    bounds.
     """
     has_obstacles = rules.obstacles.bounds.shape[0] > 0
     for b in range(first, last):

@@ -1,7 +1,8 @@
-"""Power plays: once in a game each team has a random boat disabled for a share of it, never both teams at once.
+"""Power plays: once in a game each team has a random boat disabled for a share of it.
 
-As in the reference, a decision's number is the integer part of the game's accumulated time over the time of a decision.
-Rounding may repeat a number. A power play that begins at a repeated number begins twice, with another boat.
+The two teams' power plays overlap only if `TRIES` draws find no room for both, as with shares near 0.5. As in the
+reference, a decision's number is the integer part of the game's accumulated time over the time of a decision. Rounding
+may repeat a number. A power play that begins at a repeated number begins twice, with another boat.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ def _draw_below(games: Games, b: int, count: int) -> int:
 
 @lean_kernel
 def _draw_slots(rules: Rules, games: Games, b: int) -> tuple[int, int]:
-    """Draw two slots of ``power_length`` decisions that do not overlap: the first anywhere, the second in the rest."""
+    """Draw two slots of ``power_length`` decisions: the first anywhere, the second in the rest, at 0 if none fits."""
     length, first = rules.power_length, 0
     for _ in range(TRIES):
         first = _draw_below(games, b, int(rules.max_cycles - length) + 1)

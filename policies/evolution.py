@@ -37,7 +37,7 @@ OUT_BLUE, OUT_RED = 8, 9
 N_COUNTED = 10
 PRICES = (10.0, 3.0, 2.0, 6.0, 0.05, 3.0, 4.0, 2.0)
 """Fitness weights of a plan: capture, grab and tag, minus hit of a teammate, near teammate, hit of an opponent and boat
-out of bounds, plus a field width of progress. The paper's weights are for captures, progress and contacts of
+out of bounds, plus a field width of progress. The paper's team played for captures, progress and contacts of
 teammates.
 """
 NEAR_MATES_M = 6.0

@@ -166,13 +166,7 @@ class Scene:
 
     @classmethod
     def from_view(cls, view: Any, trail_m: np.ndarray, overlay: Overlay | None = None) -> Scene:
-        """Build a scene from a live game.
-
-        Args:
-            view: A ``GameView``.
-            trail_m: (k, n, 2) positions up to now.
-            overlay: Commands of the last step.
-        """
+        """Build a scene from a ``GameView``, positions (k, n, 2) up to now, and the commands of the last step."""
         state = np.asarray(view.state)
         marks = (np.asarray(getattr(view, name)) for name in (*_OF_BOATS, "is_disabled", "flag_position", "captures"))
         return cls(float(view.time_s), state[:, [X, Y]], state[:, HEADING], state[:, SPEED], *marks, trail_m, overlay)

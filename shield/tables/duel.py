@@ -16,7 +16,7 @@ from .moves import SUB_STEP_S, run_hull
 from .sweep import closest
 
 GREEDY, LEAD, PURE, WANDER = 0, 1, 2, 3
-"""What the other boat does: lower the value, steer at our predicted place, steer at us, or steer at random."""
+"""What the other boat does: lower the value, steer at our predicted place, or steer at us. `WANDER` is unused."""
 N_RUDDERS = 5
 
 

@@ -163,13 +163,9 @@ def short(what: Any, length: int = 80) -> str:
 
 
 def read_flat(actions: Any, top_mps: Array, seat_of: Callable[[int], Seat], pairs: bool) -> Array:
-    """Return commands (n, 2) for the actions of n boats: speed m/s, relative heading deg.
+    """Return commands (n, 2) of n boats, speed m/s and relative heading deg, for an array or n actions of any kind.
 
-    Args:
-        actions: an array of pairs (n, 2) or of discrete actions (n,), or n actions of any kind.
-        top_mps: (n,) top speeds, m/s.
-        seat_of: describes boat i, for error messages.
-        pairs: arrays hold pairs, not discrete actions.
+    Arrays hold pairs (n, 2) or discrete actions (n,). ``seat_of`` describes a boat for error messages.
     """
     n = len(top_mps)
     try:

@@ -45,12 +45,7 @@ class Tallies:
         self.step[:] = 0.0
 
     def count(self, going: BoolArray, changed: BoolArray) -> None:
-        """Count one game step.
-
-        Args:
-            going: (B,) games that have not ended in this decision.
-            changed: (B, n) commands that the shield changed.
-        """
+        """Count one game step of the games ``going`` (B,); ``changed`` (B, n) are commands changed by the shield."""
         events, own = self._core.events, self._team
         for k in range(3):
             self.step[k] += (events[:, own, k] * going)[:, None]

@@ -107,12 +107,7 @@ class Network:
         return int(self.weights[0].shape[0])
 
     def outputs(self, observations: Floats, roles: NDArray[np.int64]) -> Floats:
-        """Return the last layer's values (N, out).
-
-        Args:
-            observations: (N, n_obs).
-            roles: (N,) places of the boats in their team.
-        """
+        """Return the last layer's values (N, out) for observations (N, n_obs) of boats in places (N,) of their team."""
         seen = np.asarray(observations, np.float32)
         out = self._own(seen, roles)
         if self.carrying is not None and (held := self.held(seen)).any():
