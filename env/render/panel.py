@@ -72,10 +72,10 @@ def draw_legend(surface: pygame.Surface, arena: Arena, theme: Theme) -> None:
     if arena.steered:
         x = draw_text(surface, STEERING, (x, y), theme.ink, bold=True).right + 26
     entries = (
-        ("arrow", theme.wanted, 2, "wanted by the policy"),
-        ("arrow", theme.changed, 5, "sent by the shield instead"),
+        ("arrow", theme.wanted, 2, "nominal command"),
+        ("arrow", theme.changed, 5, "filtered command"),
         ("ring", theme.muted, 2, f"discs touch = closer than {arena.separation_m:g} m"),
-        ("ring", theme.breach, 3, "breach"),
+        ("ring", theme.breach, 3, "separation violation"),
         ("cross", theme.ink, 2, "tagged"),
     )
     for kind, colour, width, text in entries:

@@ -48,7 +48,7 @@ ENTRIES: dict[str, Entry] = {
     "turn_rate_per_mps": Entry(
         "deg/s per m/s", "turn rate gained with speed; below 0: two propellers lose it", RATE, L.TURN_PER_SPEED
     ),
-    "turn_lag_s": Entry("s", "lag of the turn rate behind what is asked for", RATE, L.TURN_LAG),
+    "turn_lag_s": Entry("s", "lag of the turn rate behind its command", RATE, L.TURN_LAG),
     "turn_loss": Entry(
         "share", "of speed lost at full rudder, or at the highest turn rate; 0 to 1", BOATS, L.TURN_LOSS
     ),
@@ -187,7 +187,7 @@ class Platform:
                 if getattr(self, name) == 0:
                     raise PlatformError(f"{who}: {name} is 0; a boat of kind 'rate' needs one above 0")
             if self.heading_pid.kp == 0:
-                raise PlatformError(f"{who}: heading_pid.kp is 0; give deg/s asked for per deg of heading error")
+                raise PlatformError(f"{who}: heading_pid.kp is 0; give deg/s commanded per deg of heading error")
             return
         for name, entry in ENTRIES.items():
             if entry.kinds == RATE and getattr(self, name) != 0:

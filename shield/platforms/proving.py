@@ -101,21 +101,21 @@ def _fault_in_speed(params: Array, state: Array) -> str:
     fastest = _run(params, state, top_mps, 0.0)
     if fastest >= REACHED * top_mps:
         return ""
-    return f"told {top_mps:g} m/s it comes to {fastest:.3g} m/s within {WITHIN_S:g} s"
+    return f"commanded {top_mps:g} m/s it comes to {fastest:.3g} m/s within {WITHIN_S:g} s"
 
 
 def _fault_in_turn(params: Array, state: Array) -> str:
     off_deg = _turn(params, state, float(params[L.MAX_SPEED]))
     if off_deg <= NEAR_DEG:
         return ""
-    return f"told to turn, {off_deg:.3g} of {TURN_DEG:g} deg are left after {WITHIN_S:g} s"
+    return f"commanded to turn, {off_deg:.3g} of {TURN_DEG:g} deg are left after {WITHIN_S:g} s"
 
 
 def _fault_in_stop(params: Array, state: Array) -> str:
     _run(params, state, 0.0, 0.0)
     if state[L.SPEED] <= STOPPED * params[L.MAX_SPEED]:
         return ""
-    return f"told to stop it does {state[L.SPEED]:.3g} m/s after {WITHIN_S:g} s"
+    return f"commanded to stop it does {state[L.SPEED]:.3g} m/s after {WITHIN_S:g} s"
 
 
 def _at_fault(manoeuvre: str, params: Array, state: Array, fault_in: Callable[[Array, Array], str]) -> str:

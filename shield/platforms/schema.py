@@ -23,7 +23,7 @@ GAINS = {
 
 MEASURED: dict[str, Entry] = {
     "delay_s": Entry("s", "from command to first effect"),
-    "position_error_m": Entry("m", "covers 99 % of the errors of places foretold 1 s ahead"),
+    "position_error_m": Entry("m", "covers 99 % of the errors of positions predicted 1 s ahead"),
     "error_growth_mps": Entry("m/s", "by which that grows for every second beyond, to cover 99 % at 3 and 6 s"),
     "error_1_s_m": Entry("m", "99th percentile of held-out errors 1 s ahead"),
     "error_3_s_m": Entry("m", "99th percentile of held-out errors 3 s ahead"),

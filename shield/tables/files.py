@@ -267,7 +267,7 @@ def check_parameters(card: Card, own: Platform, other: Platform, mode: OtherMay)
     found, wanted = (card.own, card.other, card.other_may), (own.name, other.name, mode.value)
     if found != wanted:
         texts = ("{} with {}, {}".format(*names) for names in (found, wanted))
-        raise TableError("the table is for {}, wanted was {}".format(*texts))
+        raise TableError("the table is for {}, but {} was requested".format(*texts))
     for role, platform, digest in (("own", own, card.own_parameters), ("other", other, card.other_parameters)):
         if digest != platform_digest(platform):
             raise TableError(f"the table was made for other parameters of the {role} boat {platform.name!r}")

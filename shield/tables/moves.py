@@ -67,7 +67,7 @@ def moves_of(platform: Platform, speeds_mps: Array, rudders: Array, dt_s: float)
     if platform.kind != "usv":
         raise TableError(
             f"platform {platform.name!r} is a {platform.kind}: value tables are for boats of kind 'usv'; "
-            "it needs none, opponents are run through as pursuers instead"
+            "it needs none, opponents are rolled out as pursuers instead"
         )
     count, params = sub_steps(dt_s), platform.pack()
     shape = (len(speeds_mps), len(rudders))

@@ -109,7 +109,7 @@ def _for_held_commands(config: ShieldConfig, facts: GameFacts) -> ShieldConfig:
     if not math.isclose(config.model_s, facts.dt_s, rel_tol=1e-9) or (given and config.moves != facts.moves):
         steps = f", {config.moves} of them a command" if given else ""
         raise ConfigError(
-            f"the shield foresees moves of {config.model_s:g} s{steps}, but the game moves its boats {facts.moves} "
+            f"the shield predicts moves of {config.model_s:g} s{steps}, but the game moves its boats {facts.moves} "
             f"time(s) by {facts.dt_s:g} s for each command; build it by Shield.for_game(game), or with "
             f"dt_s={facts.dt_s:g}"
         )

@@ -52,7 +52,7 @@ class RaidsBatch:
         if sample:
             raise PolicyError(f"policy {name!r} has no probabilities to draw actions with; leave out sample")
         if network.n_obs != SEEN:
-            raise PolicyError(f"policy {name!r} is told {network.n_obs} numbers, raids tell {SEEN}; train it anew")
+            raise PolicyError(f"policy {name!r} expects {network.n_obs} observations, this version has {SEEN}; train it anew")
         self.network, self.name = network, name
         self._team = -1
 

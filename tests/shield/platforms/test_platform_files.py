@@ -56,7 +56,7 @@ def test_bad_entries_are_refused_in_one_line_that_names_the_remedy(case, tmp_pat
         (("max_speed_mps: 2", "max_speed_mps: 0"), "must be > 0"),
         (("max_speed_mps: 2", "max_speed_mps: 300"), "give m/s, at most 40"),
         (("max_speed_mps: 2\n", ""), "max_speed_mps is missing"),
-        (("turn_rate_per_mps: 30", "turn_rate_per_mps: 0"), "told to turn, 90 of 90 deg are left"),
+        (("turn_rate_per_mps: 30", "turn_rate_per_mps: 0"), "commanded to turn, 90 of 90 deg are left"),
         (("heading_pid: {kp: 1.5}", "heading_pid: {ki: 1.5}"), "heading_pid.kp is 0"),
         (("heading_pid: {kp: 1.5}", "heading_pid: {gain: 1.5}"), "unknown entry heading_pid.gain"),
         (("kind: rate", "kind: sail"), "choose one of"),

@@ -146,7 +146,7 @@ def test_a_table_of_other_parameters_is_refused(cache, role):
 
 def test_a_table_under_anothers_name_is_refused(cache):
     save_table(TABLE, cache / "heron-mctf2024_sim-worst-case.npz")
-    with pytest.raises(TableError, match="is for mctf2024_sim with heron, worst-case, wanted was heron with mctf"):
+    with pytest.raises(TableError, match="is for mctf2024_sim with heron, worst-case, but heron with mctf"):
         load_table("heron", "mctf2024_sim")
 
 

@@ -200,7 +200,7 @@ def test_moves_are_those_of_the_hull():
 
 @pytest.mark.parametrize("name", ["si", "di"])
 def test_boats_without_rudder_have_no_table(name):
-    with pytest.raises(TableError, match="run through as pursuers instead"):
+    with pytest.raises(TableError, match="rolled out as pursuers instead"):
         problem_of(name, "heron")
 
 
