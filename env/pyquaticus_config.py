@@ -92,6 +92,6 @@ def from_pyquaticus(settings: Mapping[str, Any], team_size: int, **overrides: An
             near = difflib.get_close_matches(str(name), [*RENAMED, *ONLY, *WITHOUT_EFFECT], n=2)
             hint = f"did you mean {', '.join(near)}?" if near else "remove it"
             raise ConfigError(f"unknown Pyquaticus setting {name!r}; {hint}")
-    if ours.get("env_bounds_m", ()) == () and "env_bounds" in settings:
-        raise ConfigError("env_bounds = 'auto' is not supported; give the field's width and height")
+    if "env_bounds" in settings and "env_bounds_m" not in {**ours, **overrides}:
+        raise ConfigError("env_bounds = 'auto' is not supported; give the field's width and height or env_bounds_m")
     return GameConfig.build(**{**ours, **overrides})

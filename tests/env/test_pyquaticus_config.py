@@ -43,6 +43,11 @@ def test_what_is_missing_has_pyquaticus_default():
     assert (config.flag_radius_m, config.preset_name) == (1.5, "pyquaticus")
 
 
+def test_what_is_set_on_top_takes_precedence():
+    config = from_pyquaticus({"env_bounds": "auto"}, team_size=1, env_bounds_m=(100.0, 50.0))
+    assert config.env_bounds_m == (100.0, 50.0)
+
+
 def test_fleets_radii_places_and_obstacles_are_taken_over():
     config = from_pyquaticus(
         {

@@ -52,7 +52,8 @@ class RaidsBatch:
         if sample:
             raise PolicyError(f"policy {name!r} has no probabilities to draw actions with; leave out sample")
         if network.n_obs != SEEN:
-            raise PolicyError(f"policy {name!r} expects {network.n_obs} observations, this version has {SEEN}; train it anew")
+            found = f"{network.n_obs} observations, this version has {SEEN}"
+            raise PolicyError(f"policy {name!r} expects {found}; train it anew")
         self.network, self.name = network, name
         self._team = -1
 
