@@ -129,6 +129,23 @@ class League(Part):
     keep: Annotated[int, Field(ge=1, le=100)] = 4
 
 
+class QmixOptions(Part):
+    """Moments kept and moments an update, updates a decision of all games, random actions, rate of Adam."""
+
+    replay: Annotated[int, Field(ge=1, le=10**8)] = 50_000
+    batch: Size = 256
+    updates: Held = 4
+    explore_end: Share = 0.05
+    explore_share: Annotated[float, Field(ge=1e-6, le=1.0)] = 0.5
+    rate: Rate = 5e-4
+
+
+class TwoPartOptions(QmixOptions):
+    """QMIX's, and its share of the decisions; the rest is PPO's."""
+
+    play_share: Share = 0.5
+
+
 class CloningOptions(Part):
     """How the scripted demonstrator's games are learned from."""
 
@@ -156,7 +173,7 @@ class RaidsOptions(Part):
 class Config(Part):
     """A training; docs/train.md says what each key is, `NO_USE` which ones an algorithm does not know."""
 
-    algorithm: Literal["ppo", "raids", "cloning"] = "ppo"
+    algorithm: Literal["ppo", "qmix", "qmix+ppo", "raids", "cloning"] = "ppo"
     preset: str = "aamas2024"
     platform: str = ""
     rules: Settings = Field(default_factory=dict)
@@ -187,11 +204,13 @@ class Config(Part):
         """Whatever the shield mode: shields of these settings must fit the games before they are trained for."""
         kind = self.algorithm
         if kind != "ppo" and SELF in self.stages[0].opponents:
-            raise ValueError(f"stages[0].opponents names {SELF!r}, and there are no snapshots; leave it out")
-        if kind != "ppo" and len(self.stages) > 1:
+            raise ValueError(f"stages[0].opponents names {SELF!r}, and there are no snapshots at first; leave it out")
+        if not kind.endswith("ppo") and len(self.stages) > 1:
             raise ValueError(f"stages is of {len(self.stages)}; algorithm {kind} learns in one")
-        if kind == "cloning" and self.device == "cuda":
+        if kind in ("qmix", "cloning") and self.device == "cuda":
             raise ValueError("device is 'cuda'; it should be 'auto' or 'cpu'")
+        if kind == "qmix+ppo" and self.actions != "discrete":
+            raise ValueError(f"actions is {self.actions!r}; it should be 'discrete'")
         if kind == "cloning":
             return self
         for stage in (None, *(one for one in self.stages if one.rules or one.shield_settings)):
@@ -199,7 +218,7 @@ class Config(Part):
                 check_shield(self.shield_of(stage), self.game(stage))
             except ConfigError as error:
                 raise ConfigError(f"shield_settings: {error}") from None
-        if kind == "ppo" and self.ppo.steps * self.games * self.game().team_size < 2:
+        if kind.endswith("ppo") and self.ppo.steps * self.games * self.game().team_size < 2:
             raise ValueError("a rollout of one decision teaches nothing; give more of ppo.steps or of games")
         return self
 
@@ -236,12 +255,23 @@ class Config(Part):
         return found
 
 
-OPTIONS: dict[str, type[Part]] = {"ppo": Part, "raids": RaidsOptions, "cloning": CloningOptions}
+OPTIONS: dict[str, type[Part]] = {
+    "ppo": Part,
+    "qmix": QmixOptions,
+    "qmix+ppo": TwoPartOptions,
+    "raids": RaidsOptions,
+    "cloning": CloningOptions,
+}
 """Options by algorithm."""
 _CURRICULUM = ("stages.net", "stages.games", "stages.most", "league.every", "league.keep")
 _OF_CLONING = ("algorithm", "preset", "platform", "rules", "games", "seed", "device", "stages", "options")
 NO_USE: dict[str, tuple[str, ...]] = {
     "ppo": ("options",),
+    "qmix": (
+        *("actions", "checkpoint_every", "start", "evaluation.every", "net.roles", *_CURRICULUM),
+        *(f"ppo.{name}" for name in Ppo.model_fields if name != "discount"),
+    ),
+    "qmix+ppo": (),
     "raids": ("actions", "checkpoint_every", "shield_every", "ppo.value", "net.features", "net.roles", *_CURRICULUM),
     "cloning": (
         *(name for name in Config.model_fields if name not in _OF_CLONING),

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from gymnasium.spaces import Box
 from steerclear.env.core import BatchedMctf
+from steerclear.policies.entrants.learned.network import Network
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array
@@ -81,21 +83,27 @@ class AskedShield:
 class TrainEnv(MctfVecEnv):
     """Every blue boat of every game is a learner; opponents, rewards, shield and rules are those of the stage.
 
-    Where networks are told places or each place has its own, observations end in the boat's place, one-hot.
+    Where networks are told places or each place has its own, observations end in the boat's place, one-hot. Where
+    nobody of the team holds the flag the network ``first`` decides, if there is one. What the learner chose there
+    changes nothing, so that what it learns from it is zero on average.
 
     Attributes:
         batch: the games of the stage under way.
         stage: its number.
         spent_s: time in the games, s, shield included.
+        first: that network, told who holds the flag; None: the learner always decides.
     """
 
-    def __init__(self, config: Config) -> None:
+    def __init__(self, config: Config, first: Network | None = None) -> None:
         self.config, self.stage = config, 0
         self.spent_s, self._ended = 0.0, []  # type: float, list[dict[str, float]]
         self.batch = self._games(0)
         self._check_stages()
         super().__init__(self.batch)
         core, boats = self.batch.core, len(self.batch.boats)
+        if first is not None and (first.n_obs, first.interval) != (core.n_obs, config.interval):
+            raise ConfigError("the network that plays first learned in other games; begin anew in another --out")
+        self.first = None if first is None else replace(first, carriers=carriers_of(core))
         told = config.net.roles != "shared"
         self._places = np.tile(np.eye(boats, dtype=np.float32), (core.n_games, 1)) if told else None
         if told:
@@ -174,7 +182,7 @@ class TrainEnv(MctfVecEnv):
         began = time.perf_counter()
         if self._guard[1] is not None:
             self._guard[1].moved = 0
-        out = self.batch.step(actions)
+        out = self.batch.step(actions if self.first is None else self._by_first(self.first, actions))
         done, boats = out.terminated | out.truncated, len(self.batch.boats)
         for game in np.flatnonzero(done[::boats]) * boats:
             whole = {name: float(np.sum(out.episodes[name][game : game + boats])) for name in OWN_EVENTS}
@@ -196,6 +204,11 @@ class TrainEnv(MctfVecEnv):
 
     def _placed(self, observations: Any) -> Any:
         return observations if self._places is None else np.concatenate([observations, self._places], axis=1)
+
+    def _by_first(self, first: Network, actions: Any) -> Any:
+        seen = self.batch.core.observations[:, self.batch.boats].reshape(self.batch.learners, -1)
+        places = np.arange(len(seen)) % len(self.batch.boats)
+        return np.where(first.held(seen), actions, first.outputs(seen, places).argmax(axis=1))
 
     def ended(self) -> list[dict[str, float]]:
         """Totals of games that have ended since the last call; hits and interventions are all its boats' together."""
@@ -237,6 +250,13 @@ class TrainEnv(MctfVecEnv):
             if name not in saved or saved[name].shape != live.shape:
                 raise ConfigError(f"the checkpoint holds other {name}; resume with the config it was made with")
             live[...] = saved[name]
+
+
+def carriers_of(core: BatchedMctf) -> np.ndarray:
+    """Numbers of an observation that tell who of the own team holds the flag."""
+    keys = [key if isinstance(key, str) else "/".join(key) for key in core.observation_keys]
+    own = [k for k, key in enumerate(keys) if key.endswith("has_flag") and not key.startswith("opponent")]
+    return np.array(own, np.int64)
 
 
 def _arrays_in(thing: Any, name: str) -> Iterator[tuple[str, np.ndarray]]:

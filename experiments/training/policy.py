@@ -130,6 +130,13 @@ class BoatPolicy(ActorCriticPolicy):
         self.mlp_extractor = RoleExtractor(size, self._roles, hidden, self.activation_fn).to(self.device)
 
 
+def numbers_of(network: nn.Module) -> tuple[list[Any], list[Any]]:
+    """Weights (1, in, out) and biases (1, out) of a plain network's layers, as they are now, in numpy."""
+    linear = [layer for layer in network.modules() if isinstance(layer, nn.Linear)]
+    weights = [np.ascontiguousarray(layer.weight.detach().cpu().numpy().T[None]) for layer in linear]
+    return weights, [layer.bias.detach().cpu().numpy()[None].copy() for layer in linear]
+
+
 def network_of(policy: Any, activation: str, card: dict[str, Any]) -> Network:
     """The actor of a policy in numpy, as it is now: no memory is shared with what learns on."""
     tensors = {name: value.detach().cpu().numpy().copy() for name, value in policy.state_dict().items()}

@@ -20,8 +20,8 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
 from steerclear.env.whole_file import whole_file
-from steerclear.policies.entrants.learned.network import Network, read_weights, write_weights
-from steerclear.policies.entrants.learned.sb3_file import add_card
+from steerclear.policies.entrants.learned.network import Network, joined, read_weights, write_weights
+from steerclear.policies.entrants.learned.sb3_file import TAKES_OVER, add_card
 from steerclear.shield.exceptions import ConfigError
 
 from .config import SELF, Config
@@ -48,15 +48,15 @@ class Kept(NamedTuple):
 
 
 class PpoTraining(Training):
-    """A training by PPO in a folder.
+    """A training by PPO in a folder, of a network that takes over from ``first`` while the flag is held, if given.
 
     Raises:
         ConfigError: an unusable setting or checkpoint.
     """
 
-    def __init__(self, config: Config, folder: Path, resume: bool = False) -> None:
+    def __init__(self, config: Config, folder: Path, resume: bool = False, first: Network | None = None) -> None:
         super().__init__(config, folder)
-        self.env = TrainEnv(config)
+        self.env = TrainEnv(config, first)
         self.model = _ppo(config, self.env)
         if config.start:
             self._begin_with(config.start)
@@ -167,14 +167,15 @@ class PpoTraining(Training):
         return self.rollouts % self.config.evaluation.every == 0 or self.decisions >= self.total
 
     def network(self) -> Network:
-        """The actor as it is now."""
-        return network_of(self.model.policy, self.config.net.activation, card_of(self.config))
+        """The actor as it is now, behind the network that plays until the flag is held, where there is one."""
+        own, first = network_of(self.model.policy, self.config.net.activation, card_of(self.config)), self.env.first
+        return own if first is None else joined(first, own, first.carriers)
 
     def _saved(self) -> BytesIO:
         """The model with its card."""
         file = BytesIO()
         self.model.save(file)
-        add_card(file, card_of(self.config))
+        add_card(file, {**card_of(self.config), TAKES_OVER: self.env.first is not None})
         return file
 
     def _packed(self) -> Kept:

@@ -30,7 +30,7 @@ from torch import nn
 from .config import Config
 from .env import TrainEnv, core_of, pool_of, set_tags, shield_of
 from .opponents import Pool
-from .policy import ACTIVATIONS
+from .policy import ACTIVATIONS, numbers_of
 from .training import FINAL, DivergedError, Notice, Training, card_of, device_of, means, threads
 
 PLACE = (
@@ -289,10 +289,8 @@ class RaidsLearner:
 
     def network(self, card: dict[str, Any]) -> Network:
         """The actor in numpy."""
-        linear, config = [layer for layer in self.actor if isinstance(layer, nn.Linear)], self._config
-        weights = [np.ascontiguousarray(layer.weight.detach().cpu().numpy().T[None]) for layer in linear]
-        biases = [layer.bias.detach().cpu().numpy()[None].copy() for layer in linear]
-        return Network(weights, biases, NONE, config.net.activation, "raids", config.interval, SEEN, card)
+        config = self._config
+        return Network(*numbers_of(self.actor), NONE, config.net.activation, "raids", config.interval, SEEN, card)
 
 
 def _network(config: Config, outputs: int) -> nn.Sequential:

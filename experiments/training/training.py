@@ -29,6 +29,8 @@ Notice = Callable[[int, str], None]
 """Told decisions made, and words for people."""
 MADE_BY = {
     "ppo": ("ppo", "PpoTraining"),
+    "qmix": ("qmix", "QmixTraining"),
+    "qmix+ppo": ("qmix", "TwoPartTraining"),
     "cloning": ("cloning", "CloningTraining"),
     "raids": ("raids", "RaidsTraining"),
 }
@@ -43,8 +45,8 @@ class DivergedError(SteerclearError):
 
 def training_of(config: Config, folder: Path, resume: bool) -> Any:
     """What trains a config's algorithm, with ``run(notice)``, ``decisions`` and ``total``."""
-    if resume and config.algorithm == "raids":
-        raise ConfigError("raids begins anew; leave out --resume")
+    if resume and config.algorithm in ("qmix", "raids"):
+        raise ConfigError(f"{config.algorithm} begins anew; leave out --resume")
     module, name = MADE_BY[config.algorithm]
     return getattr(import_module(f".{module}", __package__), name)(config, folder, resume)
 

@@ -34,6 +34,8 @@ def content_of(algorithm):
     """The tiny config, as an algorithm takes it."""
     if algorithm == "ppo":
         return deepcopy(TINY)
+    if algorithm == "qmix+ppo":
+        return {**deepcopy(TINY), "stages": [{"opponents": ["hold"]}]}
     kept = {name: TINY[name] for name in (OF_ALL if algorithm == "cloning" else OF_LEARNING)}
     kept["stages"] = [{"opponents": ["hold"]}]
     if algorithm != "cloning":

@@ -1,18 +1,19 @@
-"""The games of a training: rewards, shield and rules by stage, a shield that is asked seldom."""
+"""The games of a training: rewards, shield and rules by stage, a shield that is asked seldom, who decides first."""
 
 import numpy as np
 import pytest
 from steerclear.experiments.training.config import config_of
 from steerclear.experiments.training.env import AskedShield, TrainEnv
+from steerclear.policies.entrants.learned.network import Features, Network
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import layout as L
 
 HOLD = {"opponents": ["hold"]}
 
 
-def env_of(stages=(HOLD,), **content):
+def env_of(stages=(HOLD,), first=None, **content):
     given = {"games": 2, "rules": {"max_time_s": 60.0}, "stages": list(stages), **content}
-    return TrainEnv(config_of({**given, "evaluation": {"opponents": ["hold"]}}))
+    return TrainEnv(config_of({**given, "evaluation": {"opponents": ["hold"]}}), first)
 
 
 def test_an_unknown_reward_of_a_later_stage_is_found_at_once():
@@ -70,6 +71,18 @@ def test_a_seldom_asked_shield_is_asked_so_often_and_its_answer_is_held():
     turned = np.array(obeyed).reshape(4, 5, *obeyed[0].shape)
     assert np.abs((turned - turned[:, :1] + 180.0) % 360.0 - 180.0).max() < 1e-9
     assert env.taken()["shield_s"] > 0.0
+
+
+def test_the_first_network_decides_where_nobody_holds_the_flag():
+    none = Features(np.zeros(0, np.int64), np.zeros(0, np.int64), 0.0)
+    play = Network([np.zeros((1, 61, 17), np.float32)], [np.eye(17, dtype=np.float32)[3][None]], none, "tanh",
+                   "discrete", 10, 61)  # fmt: skip
+    env = env_of(first=play)
+    env.begin(0)
+    assert env._by_first(env.first, np.full(6, 16)).tolist() == [3] * 6
+    env.batch.core.has_flag[1, 0] = True
+    env.batch.core.observe()
+    assert env._by_first(env.first, np.full(6, 16)).tolist() == [3, 3, 3, 16, 16, 16]
 
 
 def test_hits_of_a_game_are_those_of_all_its_boats():
