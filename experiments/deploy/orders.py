@@ -1,4 +1,4 @@
-"""What to run and what came of it; the drill that was kept; refusing what cannot be run before any packet."""
+"""Orders and outcome of a run, the stored preflight, and checks of a fleet file before any packet is sent."""
 
 from __future__ import annotations
 
@@ -33,17 +33,17 @@ from .referee import game_config, game_obstacles
 LOG = logging.getLogger(__name__)
 
 VALID_S = 12.0 * 3600.0
-"""A drill counts for a day on the water, s."""
+"""A drill is valid for this long, s: one day on the water."""
 DRILLED = ("course", "response", "model")
-"""Checks that only a drill can make."""
+"""Checks that only a drill performs."""
 
 
 class Kept(BaseModel):
-    """A preflight.
+    """A stored preflight.
 
     Attributes:
-        fleet: fingerprint of the fleet file's text: a changed file wants a new drill.
-        unix_s: when it ended, s since 1970.
+        fleet: fingerprint of the fleet file's text; a changed file needs a new drill.
+        unix_s: end time, s since 1970.
         refused: names of checks neither passed nor accepted.
         checks: all results.
     """
@@ -57,7 +57,7 @@ class Kept(BaseModel):
 
 
 def keep(fleet: FleetFile, text: str, boat: str | None, results: Sequence[CheckResult], refused: Sequence[str]) -> Path:
-    """Write what all checks found, for the process of a boat, or of the team, and the text of its file.
+    """Store a preflight's check results and its file's fingerprint, for one boat's process or the team's.
 
     Raises:
         BridgeError: it cannot be written.
@@ -77,14 +77,14 @@ def keep(fleet: FleetFile, text: str, boat: str | None, results: Sequence[CheckR
 
 
 def path_of(fleet: FleetFile, boat: str | None) -> Path:
-    """Where it is kept."""
+    """Return the path of the stored preflight."""
     return fleet.log_dir / f"preflight_{boat or fleet.team}.json"
 
 
 def check_drill(
     fleet: FleetFile, text: str, boat: str | None, commanded: Sequence[str], accept: Sequence[str] = ()
 ) -> CheckResult:
-    """These boats were drilled lately, with this very file, and did as their platforms foretell."""
+    """Check that these boats were drilled recently, with this very file, and moved as their platforms predict."""
     found = _read(path_of(fleet, boat))
     why = "no preflight of these boats" if found is None else _outdated(found, text, commanded)
     if found is None or why:
@@ -102,7 +102,7 @@ def check_drill(
 
 
 def measured_delay_s(fleet: FleetFile, boat: str | None) -> float | None:
-    """Longest delay from command to effect that the drill measured, s; None: none was."""
+    """Return the longest delay from command to effect that the drill measured, s; None: not measured."""
     found = _read(path_of(fleet, boat))
     checks = () if found is None else found.checks
     delays = [check.figures.get("delay_s") for check in checks if check.name.startswith("response:")]
@@ -114,7 +114,7 @@ def _fingerprint(text: str) -> str:
 
 
 def _outdated(found: Kept, text: str, commanded: Sequence[str]) -> str:
-    """Why a preflight does not count for these boats now; empty: it does."""
+    """Return why a preflight does not count for these boats, or an empty string."""
     if found.fleet != _fingerprint(text):
         return "the fleet file has changed since its preflight"
     age_s = time.time() - found.unix_s
@@ -137,35 +137,35 @@ def _read(path: Path) -> Kept | None:
 
 
 LONGEST_MINUTES = 120.0
-"""Room for so long a log is asked for when no end is given."""
+"""Log duration for which disk space is required when the run has no end time."""
 LONGEST_WAIT_S, FASTEST = 3600.0, 1000.0
-"""Nobody means to wait longer for boats, or simulates them faster: more is a slip of the keyboard."""
+"""Limits of the wait in s and of the simulated speed; larger values are taken for typing errors."""
 RENAMED_CHECKS = {"certificate": "backup"}
-"""Names that ``--accept`` took until 0.9, and takes for one more release."""
+"""Old names that ``--accept`` took until 0.9 and still takes for one more release."""
 APART_M = 100.0
-"""Boats of the rehearsal lie so far apart: only who they are counts."""
+"""Spacing of the boats in `boats_of`; large, because their positions do not matter there."""
 
 
 @dataclass(frozen=True)
 class Orders:
-    """What to run.
+    """Settings of a run.
 
     Attributes:
         fleet_file: path of the FLEET.yaml.
         policy: name or path, as `steerclear.policies.make` takes it.
-        boat: name of this process's boat (coordination per_boat); None: all of the team.
-        minutes: how long; None: until ended.
+        boat: name of this process's boat (coordination per_boat); None: the whole team.
+        minutes: duration; None: until ended.
         accept: names of checks that may fail.
-        seed: of what the policy draws.
-        tlog: whether raw packets are kept as well.
-        speed: times faster than real time, for simulated boats that live so.
-        connect_s: how long boats are waited for, s.
-        trust: also load a model that lies among entries of others.
-        untold_delay_s: from command to effect where neither file, drill nor fit says it, s; None: one step.
-        begun_unix_s: when it was begun, s since 1970, which all its files are named after; None: when they are opened.
+        seed: of the policy's random draws.
+        tlog: whether raw packets are also stored.
+        speed: factor of real time, for simulated boats that run at it.
+        connect_s: how long to wait for boats, s.
+        trust: also load a model stored among other teams' entries.
+        untold_delay_s: delay from command to effect if neither file, drill nor fit gives it, s; None: one step.
+        begun_unix_s: start time that names all files, s since 1970; None: when they are opened.
 
     Raises:
-        ConfigError: the speed is not above 0 or the wait is out of range.
+        ConfigError: the speed or the wait is out of range.
     """
 
     fleet_file: Path
@@ -193,15 +193,15 @@ class Orders:
 
 @dataclass
 class Outcome:
-    """What came of it.
+    """Result of a run.
 
     Attributes:
         ended: why it ended.
-        refused: checks that forbade the start; nothing moved.
+        refused: checks that prevented the start; no boat moved.
         checks: results of all checks.
-        left: what each boat was left doing, and who was on the way to it.
-        near: boats on their way to one of ours at the end of the run.
-        log: path of the black box; None when it never began.
+        left: what each boat was left doing, and who was approaching it.
+        near: boats approaching one of the own boats at the end.
+        log: path of the black box; None if it never began.
         figures: of the loop and its decisions.
     """
 
@@ -216,11 +216,11 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Surface:
-    """Where a person sees and steers the run.
+    """User interface of a run.
 
     Attributes:
         shown: called with each check's result.
-        sinks: makes further sinks, such as a dashboard, once the run begins.
+        sinks: makes further sinks, such as a dashboard, when the run begins.
     """
 
     shown: Callable[[CheckResult], None] = lambda result: None
@@ -228,11 +228,11 @@ class Surface:
 
 
 def read_fleet(orders: Orders) -> tuple[FleetFile, str]:
-    """The file, with the delay the last drill or a fit measured where it declares none, and its text.
+    """Return the fleet file, completed by `with_delay`, and its text.
 
     Raises:
-        FleetFileError: it cannot be used, or there is nothing to command.
-        ConfigError: its signing key cannot be read, or others can read it.
+        FleetFileError: the file cannot be used, or commands no boat.
+        ConfigError: its signing key cannot be read, or other users can read it.
     """
     fleet, text = load_with_text(orders.fleet_file)
     if fleet.agent_ids:
@@ -250,7 +250,7 @@ def read_fleet(orders: Orders) -> tuple[FleetFile, str]:
 
 
 def with_delay(fleet: FleetFile, boat: str | None = None, untold_s: float | None = None) -> FleetFile:
-    """The file with a delay: its own, else what the last drill measured, else the longest that its platforms say."""
+    """Return the file with a delay: its own, else the last drill's, else the longest of its platform files."""
     if "delay_s" in fleet.shield:
         return fleet
     delay_s = measured_delay_s(fleet, boat)
@@ -261,11 +261,11 @@ def with_delay(fleet: FleetFile, boat: str | None = None, untold_s: float | None
 
 
 def refuse_early(fleet: FleetFile) -> None:
-    """See that a run of this file can begin, and its logs be written, before anything is sent to a boat.
+    """Check that a run of this file can begin and its logs can be written, before anything is sent to a boat.
 
     Raises:
-        FleetFileError: as `rehearse`, or the game's rules make no sense.
-        BridgeError: the folder of the logs cannot be made, or takes no file; what is wrong and what to do.
+        FleetFileError: see `rehearse`; or the game's rules are invalid.
+        BridgeError: the log folder cannot be made or written; says why and what to do.
     """
     rehearse(fleet, game_obstacles(fleet))
     try:
@@ -278,12 +278,12 @@ def refuse_early(fleet: FleetFile) -> None:
 
 
 def rehearse(fleet: FleetFile, fixed: Surroundings) -> None:
-    """Build all that the loop will build of a file, once, as it will be at its first turn.
+    """Build once everything that the loop builds from a file, as at its first turn.
 
-    ``fixed`` are static constraints of the game, see `rules.game_obstacles`.
+    ``fixed`` are the game's static obstacles, see `referee.game_obstacles`.
 
     Raises:
-        FleetFileError: the shield's settings leave nothing of the water, or it would refuse these boats.
+        FleetFileError: the shield's settings leave no free water, or the shield rejects these boats.
     """
     try:
         for form in StaticObstacles(fleet, fixed).forms:
@@ -294,7 +294,7 @@ def rehearse(fleet: FleetFile, fixed: Surroundings) -> None:
 
 
 def boats_of(fleet: FleetFile) -> Fleet:
-    """All boats of a file, at rest and far apart."""
+    """Return all boats of a file, at rest and far apart."""
     ours = {boat.name for boat in fleet.ours}
     return Fleet(
         state=np.array([fresh_state(APART_M * i, 0.0, 0.0) for i in range(len(fleet.names))]),

@@ -1,4 +1,4 @@
-"""A log as tracks: every boat's state at even steps of time, and the record of a game made of them."""
+"""Tracks of a log: every boat's state at even time steps, and the game record made of them."""
 
 from __future__ import annotations
 
@@ -22,33 +22,34 @@ from steerclear.shield.tracks import fill_memory
 
 Array = NDArray[np.float64]
 GONE_S = 1.5
-"""A boat that nothing was heard of for longer than this is not there, s."""
+"""A boat further than this from any fix in time counts as absent, s."""
 OFF_M = 1e6
-"""Where boats are that are not there, m, each as far from the next."""
+"""Position of absent boats, m; also the distance between them."""
 MOST_STEPS = 10_000_000
-"""Ten days at 10 Hz: more is damage."""
+"""Longest plausible log in steps, over ten days at 10 Hz; a longer one counts as damaged."""
 _MATCH_S = 1e-6
 _SEEN = L.SPEED + 1
 _DECIDED = np.dtype(
     [("wanted", "f8", 2), ("sent", "f8", 2), ("reason", "i8"), ("intervened", "?"), ("safety_margin_m", "f8")]
 )
-"""One boat's part of one tick."""
+"""Decision for one boat at one tick."""
 _NOTHING = ((math.nan, math.nan), (math.nan, math.nan), int(Reason.NOT_COVERED), False, math.nan)
 
 
 @dataclass(frozen=True)
 class Tracks:
-    """What happened, at even steps of time.
+    """Trajectories and decisions at even time steps.
 
     Attributes:
-        names: of the n boats: in the header's order, then others as they were met.
+        names: of the n boats, in the header's order; then others in order of appearance.
         team: (n,) 0 blue, 1 red, 2 outside the game.
-        ours: (n,) bool, boats this process commanded and its shield decided for.
+        ours: (n,) bool, boats that this process commanded and its shield decided for.
         platforms: names.
         params: (n, N_PARAM) platform rows.
         time_s: (T+1,) since the log began, s.
-        states: (T+1, n, N_STATE) rows, memory filled in; NaN where a boat was not there.
-        wanted, sent: (T, n, 2) speed m/s and absolute heading rad in [0, 2 pi); NaN where nothing was decided.
+        states: (T+1, n, N_STATE) with estimated controller memory; NaN where a boat was absent.
+        wanted, sent: (T, n, 2) nominal and filtered command: speed m/s and absolute heading rad in [0, 2 pi);
+            NaN where nothing was decided.
         reason: (T, n); NOT_COVERED where nothing was decided.
         intervened: (T, n) bool.
         safety_margin_m: (T, n); NaN where nothing was decided.
@@ -72,7 +73,7 @@ class Tracks:
     dt_s: float
 
     def marked(self, key: str) -> NDArray[np.bool_]:
-        """(T, n) whether the referee's state of the game said that of a boat, such as "driven"."""
+        """Return (T, n): whether the referee's game state set this flag of a boat, such as "driven"."""
         return np.array([[_status(game, name, key) for name in self.names] for game in self.games])
 
 
@@ -83,7 +84,7 @@ def _status(game: Mapping[str, Any], name: str, key: str) -> bool:
 
 
 class TrackBuilder:
-    """Collects ticks of a log."""
+    """Collects the ticks of a log."""
 
     def __init__(self, header: LogHeader) -> None:
         self._header = header
@@ -106,7 +107,7 @@ class TrackBuilder:
             return
         for i, name in enumerate(fleet.names):
             if GHOST in name:
-                continue  # a place the boat was kept from, not a boat
+                continue  # a position that was rejected for a boat, not a boat
             fixed_s = time_s - (0.0 if fleet.age_s is None else float(fleet.age_s[i]))
             fixes = self._fixes.setdefault(name, [])
             self._team.setdefault(name, int(fleet.team[i]))
@@ -115,7 +116,11 @@ class TrackBuilder:
                 fixes.append((fixed_s, fleet.state[i].copy()))
 
     def finish(self) -> Tracks:
-        """The tracks, or a `LogError`: there are no two ticks with boats."""
+        """Return the tracks.
+
+        Raises:
+            LogError: the log has fewer than two ticks, no boats, or implausible times.
+        """
         names = tuple(name for name, fixes in self._fixes.items() if fixes)
         if len(self._times) < 2 or not names:
             raise LogError("the log holds no two ticks with boats; there is nothing to draw or judge")
@@ -128,7 +133,7 @@ class TrackBuilder:
         platforms = [get_platform(self._header.platforms.get(kind, kind)) for kind in kinds]
         params = np.array([platform.pack() for platform in platforms])
         states = np.stack([_states(self._fixes[name], time_s) for name in names], axis=1)
-        for i in range(len(names)):  # memory nobody told: thrust that holds the speed, no rudder
+        for i in range(len(names)):  # memory that telemetry does not report: thrust that holds the speed, no rudder
             there = np.isfinite(states[:, i, L.X])
             rows = np.ascontiguousarray(states[there, i])
             fill_memory(rows, np.repeat(params[i : i + 1], len(rows), axis=0))
@@ -168,7 +173,7 @@ class TrackBuilder:
 
 
 def _states(fixes: list[tuple[float, Array]], time_s: Array) -> Array:
-    """One boat's rows (T+1, N_STATE) from its fixes: places, headings and speeds between them, memory as it was."""
+    """Interpolate a boat's position, heading and speed between its fixes; other columns are the last fix's."""
     known_s, rows = np.array([fix[0] for fix in fixes]), np.array([fix[1] for fix in fixes])
     before = np.clip(np.searchsorted(known_s - _MATCH_S, time_s, side="right") - 1, 0, len(rows) - 1)
     states = rows[before].copy()
@@ -188,7 +193,7 @@ def _wrapped(degrees: Any) -> Any:
 
 
 def placed(states: Array) -> Array:
-    """States (T+1, n, N_STATE) with boats that are not there put far away from everything and one another."""
+    """Return states (T+1, n, N_STATE) with absent boats far away from everything and from each other."""
     found, gone = states.copy(), ~np.isfinite(states[:, :, L.X])
     found[gone] = 0.0
     found[..., L.X] += gone * OFF_M * (1 + np.arange(states.shape[1]))
@@ -197,7 +202,7 @@ def placed(states: Array) -> Array:
 
 
 def record_of(header: LogHeader, tracks: Tracks) -> Record:
-    """The record of the game; boats that are not there stay where they were last, or will be first."""
+    """Return the game record; absent boats stay at their last position, or their first one before it."""
     import pandas as pd
 
     flat = pd.DataFrame(tracks.states[..., :_SEEN].reshape(len(tracks.states), -1)).ffill().bfill().fillna(0.0)
@@ -239,9 +244,9 @@ def _flags(game: Mapping[str, Any]) -> list[tuple[float, float]]:
 
 def _meta(header: LogHeader, tracks: Tracks) -> dict[str, Any]:
     try:
-        rules = GameConfig.preset(header.preset)  # radii to draw
+        rules = GameConfig.preset(header.preset)  # for the radii to draw
     except ConfigError:
-        rules = GameConfig.preset("aamas2024")  # the usual ones where the log names none that is known
+        rules = GameConfig.preset("aamas2024")  # default where the log names no known preset
     radii = rules.agent_radius_m
     flags = [_flags(game) for game in tracks.games if game.get("flags")]
     size = header.field_size_m or tuple(np.nanmax(np.abs(tracks.states[..., :2]), axis=(0, 1)).tolist())

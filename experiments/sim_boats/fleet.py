@@ -1,4 +1,4 @@
-"""`SimFleet`: simulated boats behind real MAVLink sockets, all in one thread."""
+"""`SimFleet`: simulated boats behind real MAVLink sockets, in one thread."""
 
 from __future__ import annotations
 
@@ -35,23 +35,23 @@ from .world import Approach, PositionHub, TruthRecord, World, record_of
 LOG = logging.getLogger(__name__)
 
 TICK_S = 0.02
-"""How often autopilots look at their clocks and send, s."""
+"""Interval at which autopilots check their clocks and send telemetry, s."""
 _TICKS_PER_STEP = round(STEP_S / TICK_S)
 _APART_M = 6.0
 _LONGEST_LAG_S = 1.0
-"""Further behind its clock than this, a fleet lets the time go instead of living it in a rush."""
+"""Largest lag behind the clock, s. Beyond it the fleet skips the lost time instead of catching up."""
 _LONGEST_WAIT_S = 0.1
-"""Of the machine's time: how soon the end is noticed."""
+"""Longest wait for packets, in wall-clock seconds; bounds the time until `SimFleet.close` is noticed."""
 
 Hulls = Callable[[str, Platform], Platform]
-"""What a boat, by its name and its platform of the file, really is."""
+"""Return a boat's true platform, given its name and its platform in the file."""
 
 
 def boats_of(fleet: FleetFile, opponents: str, hulls: Hulls | None = None) -> list[SimBoat]:
-    """The boats of a file; those of the game that the file's runner does not command are driven by ``opponents``.
+    """Return the boats of a fleet file; ``opponents`` steers players that the file's runner does not command.
 
-    One of these that has a link tells where it is there, and obeys it as soon as it is commanded. Boats outside the
-    game lie along the geofence's lower edge.
+    Such a boat that has a link sends its position there and obeys the link once it is commanded. Boats outside the
+    game start along the lower edge of the geofence.
     """
     boats = []
     for i, boat in enumerate(fleet.boats):
@@ -74,26 +74,26 @@ def boats_of(fleet: FleetFile, opponents: str, hulls: Hulls | None = None) -> li
 
 @dataclass(frozen=True)
 class SimSettings:
-    """How simulated boats live.
+    """Settings of a simulated fleet.
 
     Attributes:
         origin: latitude and longitude of the field's corner, deg.
         y_axis_deg: true course of the field's y axis, deg.
-        speed: times faster than real time; all rates and the autopilots' clocks go along.
-        clock: the clock to live by, instead of ``speed``.
-        autopilot: how autopilots behave; `AutopilotSettings(boot_s=0.0)` is ready at once.
+        speed: factor of real time, for all rates and the autopilots' clocks.
+        clock: replaces the clock made from ``speed``.
+        autopilot: behaviour of the autopilots; `AutopilotSettings(boot_s=0.0)` is ready at once.
         water: wind and current.
         radio: loss and delay.
-        noise: of the sensors: 0 none, 1 as measured.
-        seed: of everything random.
-        key: 32 bytes of MAVLink 2 signing, of the feed's seal too; None: neither.
-        preset: rules of the game that the boats play when there are as many red ones as blue ones.
-        rules: settings of the game that differ from the preset's.
+        noise: scale of the sensor noise: 0 none, 1 as measured.
+        seed: of all random draws.
+        key: 32-byte key for MAVLink 2 signing and for authenticating the feed; None: neither.
+        preset: rules of the game, which is played if there are as many red boats as blue ones.
+        rules: game settings that override the preset's.
         feed_to: HOST:PORT of each listener of the position feed.
-        record: whether everything is recorded, see `SimFleet.truth_record`.
-        separation_m: radius for breaches in the record.
-        waits: whether policies wait for the other boats to be commanded.
-        random_start: draw start places from ``seed`` instead of taking the game's fixed ones.
+        record: whether to record the game, see `SimFleet.truth_record`.
+        separation_m: distance that counts as a separation violation in the record, m.
+        waits: whether policies wait until the other boats are commanded.
+        random_start: draw start positions from ``seed`` instead of using the game's fixed ones.
         allow_remote: whether links may leave this machine.
 
     Raises:
@@ -124,23 +124,23 @@ class SimSettings:
 
 
 class SimFleet:
-    """Simulated boats. A context manager: entering it starts the thread, leaving it gives everything back.
+    """Simulated boats. As a context manager, it starts the thread on entry and releases all resources on exit.
 
-    Their time begins with the start and is counted in s of ``clock``. Boats with a policy are driven by it
-    from the moment on at which all other boats of the game have been commanded for 5 s (see ``waits`` and `play`).
+    Simulated time starts at 0 and is counted in seconds of ``clock``. Policies start to steer their boats once all
+    other boats of the game have been commanded for 5 s (see ``waits`` and `play`).
 
     Args:
-        boats: who they are.
-        **settings: of `SimSettings`, which says what each is.
+        boats: the boats to simulate.
+        **settings: fields of `SimSettings`.
 
     Attributes:
         boats: by name.
-        clock: the clock it lives by.
-        let_go_s: time that was not lived because the machine was too slow, s.
-        cpu_s: processor time of its thread, s.
+        clock: the fleet's clock.
+        let_go_s: simulated time skipped because the machine was too slow, s.
+        cpu_s: processor time of the thread, s.
 
     Raises:
-        ConfigError: boats that contradict each other, an address that cannot be used, or a setting out of range.
+        ConfigError: boats contradict each other, an address cannot be used, or a setting is out of range.
     """
 
     def __init__(self, boats: Sequence[SimBoat], **settings: Any) -> None:
@@ -182,13 +182,13 @@ class SimFleet:
     def from_file(
         cls, fleet: FleetFile | str | Path, *, opponents: str = "medium", hulls: Hulls | None = None, **settings: Any
     ) -> SimFleet:
-        """The boats of a FLEET.yaml: those with a link obey it, the others are driven.
+        """Build the boats of a FLEET.yaml; boats with a link obey it, policies steer the others.
 
         Args:
-            fleet: the file, read or to be read.
-            opponents: scripted policy of the boats of the game that the file's runner does not command.
-            hulls: what a boat, by its name and its platform of the file, really is; None: what the file says.
-            **settings: of `SimSettings`, beside or instead of what the file says.
+            fleet: the file or its path.
+            opponents: scripted policy of the game's boats that the file's runner does not command.
+            hulls: returns a boat's true platform, given its name and its platform in the file; None: the file's.
+            **settings: fields of `SimSettings`; they override what the file says.
 
         Raises:
             FleetFileError: the file cannot be used.
@@ -209,7 +209,7 @@ class SimFleet:
 
     @property
     def addresses(self) -> dict[str, str]:
-        """Address to open for each boat with a link."""
+        """Address to connect to, for each boat with a link."""
         return self._ports.addresses
 
     @property
@@ -224,31 +224,31 @@ class SimFleet:
 
     @property
     def is_playing(self) -> bool:
-        """Whether policies drive their boats and the record runs."""
+        """Whether the game has begun: policies steer their boats and the record runs."""
         return self._world.is_playing
 
     @property
     def is_running(self) -> bool:
-        """Whether its thread is alive."""
+        """Whether the thread is alive."""
         return self._thread is not None and self._thread.is_alive()
 
     @property
     def truth(self) -> TruthRecord | None:
-        """The record so far, when one was asked for and the game has begun."""
+        """The record so far; None without ``record`` or before the game begins."""
         return self._world.truth
 
     def play(self) -> None:
-        """Let the policies and the record begin now."""
+        """Begin the game: policies and record start immediately."""
         with self._lock:
             self._world.play()
 
     def states(self) -> dict[str, Array]:
-        """True state row (N_STATE,) of each boat, all of the same moment."""
+        """Return the true state row (N_STATE,) of each boat, all at the same time."""
         with self._lock:
             return {name: boat.hull.state.copy() for name, boat in self.boats.items()}
 
     def place(self, boat: str, x_m: float, y_m: float, heading_deg: float, speed_mps: float = 0.0) -> None:
-        """Put a boat somewhere, its controllers cleared.
+        """Move a boat to a position, heading and speed, and reset its controllers.
 
         Raises:
             ConfigError: no such boat.
@@ -257,7 +257,7 @@ class SimFleet:
             self.boat(boat).hull.place(x_m, y_m, heading_deg, speed_mps)
 
     def fault(self, boat: str, kind: str, *, duration_s: float = float("inf"), **options: Any) -> None:
-        """Begin a fault of a boat, see `faults.KINDS`; `clear` ends it.
+        """Start a fault of a boat, see `faults.KINDS`; it ends after ``duration_s`` or with `clear`.
 
         Raises:
             ConfigError: no such boat, fault or option.
@@ -275,12 +275,12 @@ class SimFleet:
             self.boat(boat).faults.stop(kind)
 
     def closest_approaches(self) -> list[Approach]:
-        """Closest approach of each pair of boats since the start, closest first."""
+        """Return the closest approach of each pair of boats since the start, closest first."""
         with self._lock:
             return self._world.closest.all()
 
     def truth_record(self) -> Record:
-        """Everything since the game began, as a game's record; with the boats' full states as array ``state``.
+        """Return the record of the game since it began, with the boats' full states as array ``state``.
 
         Raises:
             ConfigError: nothing was recorded.
@@ -289,7 +289,7 @@ class SimFleet:
             return record_of(self._world.truth).record()
 
     def judge(self, team: int = 0) -> list[dict[str, Any]]:
-        """Separation violations of a team since the game began, with verdicts (`docs.KEYS`).
+        """Return a team's separation violations since the game began, with verdicts (`docs.KEYS`).
 
         Raises:
             ConfigError: nothing was recorded.
@@ -298,7 +298,7 @@ class SimFleet:
             return record_of(self._world.truth).judge(team)
 
     def advance(self, seconds: float) -> None:
-        """Live that much simulated time at once, without a thread and without waiting.
+        """Simulate that many seconds at once, without thread and without waiting.
 
         Raises:
             ConfigError: the thread is running.
@@ -313,7 +313,7 @@ class SimFleet:
         """Start the thread.
 
         Raises:
-            ConfigError: it runs already.
+            ConfigError: the thread is already running.
         """
         if self.is_running:
             raise ConfigError("the fleet runs already")
@@ -323,7 +323,7 @@ class SimFleet:
         self._thread.start()
 
     def close(self) -> None:
-        """Stop the thread and give the sockets back; may be called again."""
+        """Stop the thread and close the sockets; may be called again."""
         self._ends.set()
         if self._thread is not None:
             self._thread.join()
@@ -345,7 +345,7 @@ class SimFleet:
         self.close()
 
     def boat(self, name: str) -> Boat:
-        """The boat of that name.
+        """Return the boat of that name.
 
         Raises:
             ConfigError: there is none.
@@ -355,7 +355,7 @@ class SimFleet:
         return self.boats[name]
 
     def _live(self) -> None:
-        """Live the clock's time, a tick after the other, and read what comes in between."""
+        """Simulate tick after tick by the clock, and read packets in between."""
         due_s = self.clock.now_s() + TICK_S
         began_s = time.thread_time()
         while not self._ends.is_set():
@@ -373,7 +373,7 @@ class SimFleet:
             self.cpu_s = time.thread_time() - began_s
 
     def _wait(self, due_s: float) -> None:
-        """Wait until then or until there is something to read, and read it."""
+        """Wait until then or until a packet comes, and read it."""
         left_s = (due_s - self.clock.now_s()) / getattr(self.clock, "speed", 1.0)
         patience_s = min(max(left_s, 0.0), _LONGEST_WAIT_S)
         if wait(self._ports.sockets(), patience_s):

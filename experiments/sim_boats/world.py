@@ -24,21 +24,23 @@ from .hull import STEP_S, Bear, Keep, Order, Steer, Turn, Weather
 from .sensing import Snapshot
 
 RECENT_S = 5.0
-"""A fault counts for what happens so long after it, s."""
+"""A fault is reported with a separation violation up to this long after it acted, s."""
 LEFT_S = 2.0
-"""A boat is left in order when it is in HOLD so soon after the last command it obeyed, s: while HOLD is asked for, 4 s,
-that may time out, after 3 s. A boat whose runner died stays in GUIDED, or its failsafe holds it later."""
+"""A run left its boat in order if the boat is in HOLD within this time after its last obeyed command, s.
+
+Runners request HOLD for 4 s and the command times out after 3 s. A boat whose runner died stays in GUIDED, or its
+failsafe holds it later."""
 
 
 @dataclass(frozen=True)
 class Mark:
-    """One boat at one step.
+    """State of one boat at one step.
 
     Attributes:
-        steered: whether a policy or a commander whom it obeys steers it.
-        faults: kinds of faults that act on it.
-        commanded: whether it obeys a commander.
-        held: whether its autopilot is in HOLD, as the end of a run leaves it.
+        steered: whether a policy, or a commander that it obeys, steers the boat.
+        faults: kinds of the active faults.
+        commanded: whether the boat obeys a commander.
+        held: whether its autopilot is in HOLD, as a run leaves it at its end.
     """
 
     steered: bool
@@ -48,22 +50,22 @@ class Mark:
 
 
 Marks = Sequence[Sequence[Mark]]
-"""Of all boats, step by step."""
+"""Marks of all boats, step by step."""
 
 
 def last_commanded(marks: Marks) -> list[int]:
-    """Step at which each boat obeyed a commander for the last time, 1 the first that was moved; 0: never."""
+    """Return the step at which each boat last obeyed a commander; the first step is 1, and 0 means never."""
     steps = range(len(marks), 0, -1)
     return [next((step for step in steps if marks[step - 1][i].commanded), 0) for i in range(len(marks[0]))]
 
 
 def circumstances(marks: Marks, last: Sequence[int], step: int, boats: Sequence[int]) -> dict[str, Any]:
-    """Entries of a breach at a step between boats, see `docs.KEYS`.
+    """Return what held two boats at a separation violation, see `docs.KEYS`.
 
     Args:
         marks: of the whole run.
-        last: when each boat was commanded for the last time, see `last_commanded`.
-        step: 1 the first that was moved.
+        last: step at which each boat was last commanded, see `last_commanded`.
+        step: step of the violation; the first is 1.
         boats: numbers of the two boats.
     """
     recent = marks[max(0, step - round(RECENT_S / STEP_S)) : step]
@@ -76,7 +78,7 @@ def circumstances(marks: Marks, last: Sequence[int], step: int, boats: Sequence[
 
 
 def _is_left(after: Marks, boat: int) -> bool:
-    """Whether a boat was left in order by whoever commanded it last."""
+    """Whether the boat was in HOLD soon after its last command."""
     return any(row[boat].held for row in after[: round(LEFT_S / STEP_S)])
 
 
@@ -87,7 +89,7 @@ def _unsteered_s(until: Marks, boat: int) -> float:
 
 @dataclass(frozen=True)
 class Approach:
-    """Closest approach of two boats' centres: their names, m, and simulated time, s."""
+    """Closest approach of two boats' centres: names, distance in m and simulated time in s."""
 
     first: str
     second: str
@@ -96,7 +98,7 @@ class Approach:
 
 
 class ClosestApproaches:
-    """The closest approach of each pair so far."""
+    """Closest approach of each pair of boats so far."""
 
     def __init__(self, names: Sequence[str]) -> None:
         self._names = list(names)
@@ -105,14 +107,14 @@ class ClosestApproaches:
         self._time_s = np.zeros(self._pairs[0].size)
 
     def see(self, position_m: Array, time_s: float) -> None:
-        """Boats are at (n, 2), m."""
+        """Update with the boats' positions (n, 2), m."""
         first, second = self._pairs
         apart = np.hypot(*(position_m[first] - position_m[second]).T)
         closer = apart < self._distance_m
         self._distance_m[closer], self._time_s[closer] = apart[closer], time_s
 
     def all(self) -> list[Approach]:
-        """One for each pair, closest first."""
+        """Return one approach for each pair, closest first."""
         order = np.argsort(self._distance_m, kind="stable")
         pairs = [(self._names[self._pairs[0][k]], self._names[self._pairs[1][k]]) for k in order]
         figures = zip(self._distance_m[order].tolist(), self._time_s[order].tolist(), strict=True)
@@ -120,7 +122,7 @@ class ClosestApproaches:
 
 
 class TruthRecord:
-    """Records a game of simulated boats that has begun; ``separation_m``: radius for breaches."""
+    """Records a simulated game that has begun; below ``separation_m`` is a separation violation."""
 
     def __init__(self, game: Game, separation_m: float = DEFAULT_SEPARATION_M) -> None:
         self._game, self._separation_m = game, separation_m
@@ -139,7 +141,7 @@ class TruthRecord:
         self._log.start(core)
 
     def step(self, orders: Sequence[Order], headings_deg: Array, marks: Sequence[Mark]) -> None:
-        """Boats have moved by a step under these orders from these headings; what held them is marked."""
+        """Record a step: the orders, the headings before it, and the marks of all boats."""
         told = np.array([_told(order, heading) for order, heading in zip(orders, headings_deg, strict=True)])
         self._recorder.step(self._game.core.view(), told, told)
         self._log.step(self._game.core)
@@ -156,9 +158,9 @@ class TruthRecord:
         return [int(count) for count in self._game.core.tags[0]]
 
     def record(self) -> Record:
-        """Everything so far, see `steerclear.env.record`; with further arrays.
+        """Return the record so far, see `steerclear.env.record`, with two more arrays.
 
-        These are ``state`` (T+1, n, N_STATE), and ``commanded`` (T, n) bool: whether each boat obeyed a commander.
+        ``state`` is (T+1, n, N_STATE); ``commanded`` (T, n) says whether each boat obeyed a commander.
         """
         record = self._recorder.finish()
         record["breaches"] = find_breaches(record["position"], self._separation_m)
@@ -167,9 +169,9 @@ class TruthRecord:
         return {**record, "state": self._log.states, "commanded": commanded}
 
     def judge(self, team: int = 0) -> list[dict[str, Any]]:
-        """What the oracle says of the breaches that a team's boats were in, see `docs.KEYS`.
+        """Return a team's separation violations with the post-hoc avoidability analysis, see `docs.KEYS`.
 
-        With what held the boats then, see `circumstances`.
+        Each also has the entries of `circumstances`.
         """
         found = judge_game(self._log, self._game.core.params, self.record(), team)
         last = last_commanded(self._marks) if found else []
@@ -180,10 +182,10 @@ class TruthRecord:
 
 
 def record_of(truth: TruthRecord | None) -> TruthRecord:
-    """The record.
+    """Return the record, or raise if there is none.
 
     Raises:
-        ConfigError: there is none.
+        ConfigError: nothing was recorded.
     """
     if truth is None:
         raise ConfigError("nothing was recorded; build SimFleet with record=True, with as many red boats as blue ones")
@@ -191,7 +193,7 @@ def record_of(truth: TruthRecord | None) -> TruthRecord:
 
 
 def _told(order: Order, heading_deg: float) -> tuple[float, float]:
-    """Speed m/s and absolute heading deg of an order."""
+    """Return the speed in m/s and absolute heading in deg of an order."""
     heading, speed = heading_deg, 0.0
     match order:
         case Steer(heading_rad, speed):
@@ -206,16 +208,16 @@ def _told(order: Order, heading_deg: float) -> tuple[float, float]:
 SENDER = "gps_hub"
 _KEPT = 100
 _ERROR_M, _ERROR_PER_NOISE_M = 0.05, 0.25
-"""Bound of a fix's error: what rounding makes, and three times the sensors' spread."""
+"""Error bound of a fix: rounding, plus three standard deviations of the sensors per unit of noise."""
 _PLAY_AFTER_S = 5.0
-"""Scripted players begin when every boat of the game with a link has been commanded for this long."""
+"""Scripted players begin when all linked boats of the game have been commanded for this long, s."""
 
 
 class PositionHub:
-    """Sends the positions of boats to the feed's listeners, HOST:PORT each; sealed where there is a key.
+    """Sends boat positions to the feed's listeners (HOST:PORT); messages are authenticated if there is a key.
 
     Raises:
-        ConfigError: an address of another form.
+        ConfigError: an address is malformed.
     """
 
     def __init__(self, to: Iterable[str], frame: FieldFrame, noise: float, key: bytes | None = None) -> None:
@@ -224,7 +226,7 @@ class PositionHub:
         self._past: dict[str, deque[Snapshot]] = {}
 
     def send(self, boats: Iterable[Boat], now_s: float) -> None:
-        """Send where they are now; boats whose faults hide them are left out."""
+        """Send current positions, except of boats whose faults hide them."""
         fixes = []
         for boat in boats:
             past = self._past.setdefault(boat.spec.name, deque(maxlen=_KEPT))
@@ -238,7 +240,7 @@ class PositionHub:
         self._sender.send_positions(fixes)
 
     def close(self) -> None:
-        """Give the sockets back."""
+        """Close the sockets."""
         self._sender.close()
 
 
@@ -246,13 +248,13 @@ class World:
     """Moves all boats.
 
     Args:
-        boats: all of them.
-        weather: what drifts them.
-        game: the game some of them play, or None.
-        players: those, in the game's order.
+        boats: all boats.
+        weather: wind and current.
+        game: the game that some of them play, or None.
+        players: the boats that play, in the game's order.
         hub: sends positions, or None.
         waits: whether scripted players wait until the others are commanded.
-        record_radius_m: radius for breaches in the record; None: nothing is recorded.
+        record_radius_m: distance that counts as a separation violation, m; None: nothing is recorded.
     """
 
     def __init__(
@@ -274,7 +276,7 @@ class World:
             game.start(self._states())
 
     def warm_up(self) -> None:
-        """Compile everything now, so that no step takes longer than the others."""
+        """Compile all code, so that no later step is slowed by compilation."""
         self._boats[0].hull.warm_up()
         if self._game is not None and not self.is_playing:
             self._game.orders()
@@ -282,7 +284,7 @@ class World:
             self._game.start(self._states())
 
     def play(self) -> None:
-        """Let the scripted players and the record begin, now."""
+        """Begin the game and the record immediately."""
         if self._game is None or self.is_playing:
             return
         self._game.start(self._states())
@@ -299,7 +301,7 @@ class World:
         for boat in self._boats:
             boat.hull.drift_mps = drift
             if boat.is_commanded or (boat.has_link and not boat.spec.policy):
-                boat.step(time_s)  # somebody who commands a boat by its link takes it from its policy
+                boat.step(time_s)  # whoever commands a boat by its link replaces its policy
             else:
                 boat.step(time_s, orders.get(boat, Keep()))
         self.closest.see(np.array([boat.hull.position_m for boat in self._boats]), time_s)
@@ -311,11 +313,11 @@ class World:
             self._hub.send(self._boats, time_s)
 
     def _states(self) -> Array:
-        """State rows of the boats that play."""
+        """State rows of the players."""
         return np.array([boat.hull.state for boat in self._players]).reshape(-1, L.N_STATE)
 
     def _look_for_play(self) -> None:
-        """Begin once every boat of the game that has a link obeys somebody, and goes on doing so."""
+        """Begin the game once all linked boats of the game have obeyed a commander for long enough."""
         if self.is_playing or self._game is None:
             return
         obeys = [boat.is_commanded for boat in self._players if not boat.spec.policy and boat.has_link]
