@@ -23,7 +23,7 @@ from .cli_examples import EXAMPLES, MANY_OPTIONS, RARE
 from .cli_files import check_files, hints_of
 from .runner import Interrupted as Interrupted
 from .terminal import SafeConsole
-from .workers import JobFault, fault_words, interrupted_by_sigterm, machine_words
+from .workers import JobFault, fault_words, interrupted_by_signals, machine_words
 
 MAX_WIDTH = 100
 """Tables do not stretch over wider terminals."""
@@ -152,7 +152,7 @@ def command(**defaults: Any) -> Made:
                 check_files(guarded, given)
                 for name, group in groups.items():
                     given[name] = group(**{field.name: given.pop(field.name) for field in dataclasses.fields(group)})
-                with interrupted_by_sigterm():
+                with interrupted_by_signals():
                     return function(**given)
             except SteerclearError as error:
                 _leave(f"error: {error}", ExitCode.BAD_INPUT)

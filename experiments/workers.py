@@ -51,6 +51,8 @@ MACHINE = {
     errno.EIO: "look after that disk",
 }
 """What a machine may refuse, with what helps."""
+_INTERRUPTED = threading.Event()
+"""Set once a signal asks for the end: compiled code and callbacks may lose the KeyboardInterrupt that it raises."""
 _ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
 
 
@@ -188,6 +190,8 @@ def outcomes(
         if outcome.trace is not None:
             outcome = replace(outcome, error=_words_of_trace(outcome.error or "", outcome.trace))
         yield outcome
+        if _INTERRUPTED.is_set():
+            raise KeyboardInterrupt
 
 
 def _call(function: Callable[[], object]) -> bool:
@@ -273,20 +277,25 @@ def _begin_worker() -> None:
 
 
 @contextlib.contextmanager
-def interrupted_by_sigterm() -> Iterator[None]:
-    """Let SIGTERM end what is inside as Ctrl-C does: what is finished is kept, and no worker is left."""
+def interrupted_by_signals() -> Iterator[None]:
+    """Let Ctrl-C and SIGTERM end what is inside: finished jobs are kept, and no worker is left."""
 
     def interrupt(*_: Any) -> None:
+        _INTERRUPTED.set()
         raise KeyboardInterrupt
 
     if threading.current_thread() is not threading.main_thread():  # signals are the main thread's
         yield
         return
-    before = signal.signal(signal.SIGTERM, interrupt)
+    _INTERRUPTED.clear()
+    heeded = [number for number in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(number) is not signal.SIG_IGN]
+    before = {number: signal.signal(number, interrupt) for number in heeded}
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL if before is None else before)
+        for number, handler in before.items():
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
+        _INTERRUPTED.clear()
 
 
 def _ray() -> Any:

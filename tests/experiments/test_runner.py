@@ -1,5 +1,6 @@
 """The runner: what is kept on disk, by whom, of which code; where jobs run; how a run ends and is gone on with."""
 
+import contextlib
 import json
 import os
 import re
@@ -15,7 +16,15 @@ import pytest
 from steerclear.experiments import provenance, result_files, runner, workers
 from steerclear.experiments.result_files import finite, write_json, write_table
 from steerclear.experiments.runner import Experiment, Interrupted, execute, job_id
-from steerclear.experiments.workers import JobFault, Ray, attempt, outcomes, processes_of, workers_of
+from steerclear.experiments.workers import (
+    JobFault,
+    Ray,
+    attempt,
+    interrupted_by_signals,
+    outcomes,
+    processes_of,
+    workers_of,
+)
 from steerclear.shield.exceptions import ConfigError, GameError
 
 
@@ -178,16 +187,35 @@ def test_a_folder_that_cannot_be_written_to_is_one_clear_error(tmp_path):
         execute(experiment(""), tmp_path, resume=True)
 
 
+def deaf(job):
+    """A job in which the interruption is lost, as in a callback of compiled code."""
+    with contextlib.suppress(KeyboardInterrupt):
+        os.kill(os.getpid(), job["signal"])
+        time.sleep(10.0)
+    return [{"number": job["number"]}]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="sends POSIX signals")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interruption_that_a_job_loses_ends_the_run_after_that_job(tmp_path, number):
+    work_left = [{"number": k, "signal": int(number)} for k in range(3)]
+    before = signal.getsignal(number)
+    with interrupted_by_signals():
+        run = execute(Experiment("test", {}, work_left, deaf), tmp_path)
+    assert (run.interrupted, run.finished) == (True, 1)
+    assert signal.getsignal(number) is before
+
+
 SCRIPT = """
 import sys
 from pathlib import Path
 from steerclear.experiments.runner import execute
-from steerclear.experiments.workers import interrupted_by_sigterm
+from steerclear.experiments.workers import interrupted_by_signals
 from steerclear.shield.exceptions import ConfigError
 from test_runner import experiment
 if __name__ == "__main__":
     try:
-        with interrupted_by_sigterm():
+        with interrupted_by_signals():
             tell = lambda done, of: done and print("ready", flush=True)
             run = execute(experiment("", "wait", "wait"), Path(sys.argv[1]), 2, notice=tell)
         print(run.rows[0]["process"], flush=True)
