@@ -53,7 +53,7 @@ def test_the_command_for_a_turn_makes_that_turn_in_the_whole_step(platform, turn
 
 @pytest.mark.parametrize(("steps", "platform"), [(10, "surveyor"), (4, "heron")])
 def test_the_place_foreseen_is_where_the_game_puts_the_boat(steps, platform):
-    """Own boats at the end of the decision, boats that the game drives at every sample until then."""
+    """Own boats at the end of the decision, boats near them that the game drives at every sample until then."""
     rules = {"decision_steps": steps, "platforms": platform, "power_play_share": 0.0, "max_time_s": 150.0}
     env = MctfEnv(GameConfig.preset("mctf2026", default_start=False, on_side_start=False, **rules), seed=4)
     blue, red = (
@@ -76,7 +76,8 @@ def test_the_place_foreseen_is_where_the_game_puts_the_boat(steps, platform):
         assert np.hypot(*(foreseen[:, :2] - now).T)[ours].max(initial=0.0) < SAME_M
         after, stride = [*places[1:], now], work.boats.stride
         upper = np.array([places[0][:, 1] > 40.0, now[:, 1] > 40.0])  # the nearer corner is driven to: it may change
-        for j in np.flatnonzero(known & (upper[0] == upper[1])):
+        near = work.near[ours].any(axis=0)  # others matter to nobody, and are not predicted
+        for j in np.flatnonzero(known & near & (upper[0] == upper[1])):
             driven += 1
             for k in range((steps - 1) // stride + 1):
                 assert np.hypot(*(path[j, k] - after[k * stride][j])) < SAME_M

@@ -191,6 +191,13 @@ def _time_s(value: Any) -> float:
     return number
 
 
+def _unix_ns(value: Any) -> int:
+    number = int(value)
+    if not 0 <= number < 2**63:
+        raise ValueError(f"{number} is no time in ns since 1970")
+    return number
+
+
 def _boat(row: Mapping[str, Any]) -> LoggedBoat:
     boat = LoggedBoat(**row)
     if boat.team not in (0, 1, 2) or not all(isinstance(text, str) for text in (boat.name, boat.agent, boat.platform)):
@@ -225,7 +232,7 @@ PARTS: dict[str, tuple[str, Part]] = {
     "preset": ("preset", _TEXT),
     "policy": ("policy", _TEXT),
     "clock_s": ("clock_s", Part(plain, _time_s)),
-    "unix_ns": ("unix_ns", Part(str, int)),
+    "unix_ns": ("unix_ns", Part(str, _unix_ns)),
     "sources": ("sources", _TEXT),
     "machine": ("machine", _TEXT),
     "config": ("shield", _hidden(asdict, lambda found: ShieldConfig.of(**current_settings(restored(found))))),

@@ -190,3 +190,10 @@ def test_a_header_with_a_setting_nobody_knows_says_who_wrote_it():
     message["shield"] = json.dumps(json.loads(message["shield"]) | {"zeal": 1.0})
     with pytest.raises(LogError, match=r"unknown shield setting 'zeal'.*written by 9\.9"):
         LogHeader.from_message(message)
+
+
+@pytest.mark.parametrize("moment", ["-1", str(2**63), "1e9"])
+def test_a_header_of_no_time_is_damaged(moment):
+    message = {**LogHeader(ShieldConfig()).to_message(), "unix_ns": moment}
+    with pytest.raises(LogError, match="the log's header is damaged"):
+        LogHeader.from_message(message)
