@@ -259,7 +259,7 @@ def replay(
 def fit(
     logs: Annotated[
         list[Path],
-        typer.Argument(metavar="LOG...", help="Logs of one boat: black boxes (.mcap) and .csv of steps."),
+        typer.Argument(metavar="LOG...", help="Logs of one boat: .csv of steps, .tlog, ArduPilot .bin, .mcap, .alog."),
     ],
     file: Annotated[Path, o.option("FILE", "Platform file to write (.yaml); a new one.", "--out"), NEW] = Path(
         "boat.yaml"
@@ -267,6 +267,7 @@ def fit(
     name: Annotated[str | None, o.option("NAME", "Of the boat.", default="the file's name")] = None,
     kind: Annotated[str, o.option("KIND", "rate, usv, or auto: the one that predicts best.")] = "auto",
     boat: Annotated[str | None, o.option("NAME", "The boat, of a black-box log with several.")] = None,
+    system_id: Annotated[int | None, o.option("N", "The boat, of a .tlog with several.")] = None,
     plot: Annotated[
         Path | None, o.option("FILE", "Picture of the fit, a new file.", default="beside --out, .png"), NEW
     ] = None,
@@ -284,7 +285,7 @@ def fit(
     if kind != "auto" and kind not in MODELS:
         raise ConfigError(f"--kind is {kind!r}; give auto or one of {', '.join(MODELS)}")
     left_out: list[str] = []
-    runs = read_logs(logs, boat, left_out.append)
+    runs = read_logs(logs, boat, system_id, left_out.append)
     for words in left_out:
         err().print(f"left out: {words}", style="yellow", soft_wrap=True)
     kinds = tuple(MODELS) if kind == "auto" else (kind,)

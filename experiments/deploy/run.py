@@ -163,11 +163,7 @@ def checks_of(session: VehicleSession, minutes: float) -> list[Check]:
     disk = Check("disk", lambda: check_disk(fleet.log_dir, boats=len(fleet.boats), minutes=minutes))
     mavlink = {name: link for name, link in session.links.items() if isinstance(link, MavlinkLink)}
     moos = {name: link for name, link in session.links.items() if isinstance(link, MoosLink)}
-
-    def fence(name: str) -> CheckResult:
-        return check_fence(name, fleet, mavlink[name].health().parameters)
-
-    fences = [Check(f"fence:{name}", partial(fence, name)) for name in mavlink]
+    fences = [Check(f"fence:{name}", partial(check_fence, name, fleet, link)) for name, link in mavlink.items()]
     links = [*link_checks(mavlink, fleet.platform_of, session.clock), *fences, *moos_checks(moos, fleet)]
     fixed = game_obstacles(fleet)
 

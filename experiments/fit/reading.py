@@ -1,17 +1,36 @@
-"""Logs of a boat, a CSV of steps or a black box: runs to fit, and refusal of logs that show too little."""
+"""Logs of any kind, by the endings of their names: runs to fit, and refusal of logs that show too little."""
 
 from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Sequence
+import os
+from bisect import bisect_right
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from steerclear.shield.bridge.blackbox import LogReader
 
-from .runs import SEEN, TOLD, FitError, Run, Streams, Tell, spans, untold
+from .runs import NEEDED, SEEN, TOLD, FitError, Run, Streams, Tell, spans, untold
 
+EARTH_M = 6378137.0
+POSITION, TOP_SPEED = "GLOBAL_POSITION_INT", ("WP_SPEED", "CRUISE_SPEED")
+"""Parameters of which ArduPilot Rover takes the first that is not 0 for the speed that thrust is a share of."""
+COMMANDS = ("SET_ATTITUDE_TARGET", "SET_POSITION_TARGET_LOCAL_NED")
+TLOG_NAMES = {
+    **dict.fromkeys(SEEN, POSITION),
+    "heading": f"ATTITUDE or {POSITION}",
+    "told_speed": f"{COMMANDS[0]} with the parameter WP_SPEED, or {COMMANDS[1]}",
+    "told_heading": " or ".join(COMMANDS),
+}
+BIN_NAMES = dict(zip(NEEDED, ("POS", "POS", "ATT.Yaw", "GPS.Spd", "THR.DesSpeed", "NTUN.DesYaw"), strict=True))
+BIN_FIELDS = {name.partition(".")[0]: (what, name.partition(".")[2]) for what, name in BIN_NAMES.items() if "." in name}
+MASK_IGNORES_RATES, MASK_VELOCITY_ONLY = 7, 3527
+NO_HEADING, FIX_3D = 65535, 3
 LONGEST_RUN_S = 30.0
 """Longer runs are cut into pieces, so that some can be held out."""
 FEWEST_RUNS, FEWEST_TURNING_DEG, FEWEST_SPEED_MPS = 3, 20.0, 0.3
@@ -27,28 +46,42 @@ COLUMNS: dict[str, tuple[str, tuple[str, ...]]] = {
     "told_heading": ("heading told", ("told_heading_deg", "cmd_heading_deg", "des_heading")),
 }
 """Columns of a CSV of steps: in words, and the names that each may have."""
+MOOS_NAMES = ("NAV_X", "NAV_Y", "NAV_HEADING", "NAV_SPEED", "DESIRED_SPEED", "DESIRED_HEADING")
+VARIABLES = dict(zip(MOOS_NAMES, NEEDED, strict=True))
+"""Of MOOS-IvP."""
+HELM_HOLDS_S = 5.0
+"""The helm of MOOS-IvP posts desired values when they change, and at least this often."""
 
 
-def read_logs(paths: Sequence[Path], boat: str | None = None, tell: Tell = untold) -> list[Run]:
+def read_logs(
+    paths: Sequence[Path], boat: str | None = None, system_id: int | None = None, tell: Tell = untold
+) -> list[Run]:
     """Read runs of all logs, long ones in pieces.
 
     Args:
         paths: of the logs.
         boat: name of the boat, of a black box with several.
+        system_id: of the boat, of a telemetry log with several.
         tell: is told what of a log is left out, and why.
 
     Raises:
         FitError: a log cannot be read or contradicts itself, or together they show too little to fit.
         LogError: it is no black-box log.
     """
+    readers: dict[str, Callable[[Path, Tell], list[Run]]] = {
+        ".csv": read_csv,
+        ".tlog": partial(read_tlog, system_id=system_id),
+        ".bin": read_bin,
+        ".mcap": partial(read_box, boat=boat),
+        ".alog": read_alog,
+    }
     runs: list[Run] = []
     for path in paths:
-        kind = path.suffix.lower()
-        if kind not in (".csv", ".mcap"):
-            raise FitError(f"{path.name} is no log that can be read; give a .csv of steps or a black box (.mcap)")
+        if path.suffix.lower() not in readers:
+            raise FitError(f"{path.name} is no log that can be read; give {', '.join(readers)}")
         if not path.is_file():
             raise FitError(f"there is no log {path}")
-        runs += read_csv(path, tell) if kind == ".csv" else read_box(path, tell, boat)
+        runs += readers[path.suffix.lower()](path, tell)
     pieces = [run.part(a, b) for run in runs for a, b in run.bounds(LONGEST_RUN_S)]
     _check_enough(runs, len(pieces))
     return pieces
@@ -84,6 +117,23 @@ def read_csv(path: Path, tell: Tell) -> list[Run]:
     return streams.runs({what: words for what, (words, _) in COLUMNS.items()}, sampled=True)
 
 
+def read_alog(path: Path, tell: Tell) -> list[Run]:
+    """Read MOOS-IvP's ``.alog``: a line a posting, ``time variable source value``."""
+    streams = Streams(path.stem, tell)
+    with path.open(encoding="utf-8", errors="replace") as file:
+        for line in file:
+            parts = line.split()
+            if len(parts) < 4 or parts[1] not in VARIABLES or line.startswith("%"):
+                continue
+            try:
+                time_s, value = float(parts[0]), float(parts[3])
+            except ValueError:
+                continue  # a posting that is no number says nothing
+            streams.clock(time_s)
+            streams.add(VARIABLES[parts[1]], time_s, value)
+    return streams.runs({what: name for name, what in VARIABLES.items()}, HELM_HOLDS_S)
+
+
 def read_box(path: Path, tell: Tell, boat: str | None = None) -> list[Run]:
     """Read one boat of a black box of ours; readings count from when they were true."""
     boats: dict[str, Streams] = {}
@@ -99,16 +149,157 @@ def read_box(path: Path, tell: Tell, boat: str | None = None) -> list[Run]:
                     streams.add("speed", reading.read_s - reading.velocity_age_s, reading.speed_mps)
             for name, sent in tick.sent.items():
                 if sent.delivered and math.isfinite(sent.heading_rad) and math.isfinite(sent.speed_mps):
-                    streams = boats.setdefault(name, Streams(path.stem, tell))
-                    heading_deg = math.degrees(sent.heading_rad)
+                    streams, heading_deg = (
+                        boats.setdefault(name, Streams(path.stem, tell)),
+                        math.degrees(sent.heading_rad),
+                    )
                     streams.add_all(sent.sent_s, told_heading=heading_deg, told_speed=sent.speed_mps)
-    names = ", ".join(sorted(boats)) or "none"
-    if boat is None and len(boats) > 1:
-        raise FitError(f"{path.name} tells of boats {names}; name one with --boat")
-    if not boats or boat not in (None, *boats):
-        raise FitError(f"{path.name} tells nothing of boat {boat or ''}; it has {names}")
-    streams = next(iter(boats.values())) if boat is None else boats[boat]
-    return streams.runs(dict.fromkeys(SEEN, "readings") | dict.fromkeys(TOLD, "commands sent"))
+    name = _chosen(path, sorted(boats), boat, "--boat")
+    return boats[name].runs(dict.fromkeys(SEEN, "readings") | dict.fromkeys(TOLD, "commands sent"))
+
+
+def _chosen(path: Path, known: Sequence[Any], asked: Any, option: str) -> Any:
+    """Which of the boats in a log is meant."""
+    names = ", ".join(map(str, known)) or "none"
+    if asked is None and len(known) > 1:
+        raise FitError(f"{path.name} tells of boats {names}; name one with {option}")
+    if not known or asked not in (None, *known):
+        raise FitError(f"{path.name} tells nothing of boat {asked or ''}; it has {names}")
+    return known[0] if asked is None else asked
+
+
+def read_tlog(path: Path, tell: Tell, system_id: int | None = None) -> list[Run]:
+    """Read one boat of a telemetry log."""
+    kept = [m for m in _messages(path) if m.get_type() in (*COMMANDS, POSITION, "ATTITUDE", "PARAM_VALUE")]
+    sources = Counter(_source(m) for m in kept if m.get_type() == POSITION and _is_place(m.lat, m.lon))
+    if not sources:
+        raise FitError(f"{path.name} tells no positions ({POSITION}); give a log of a boat's telemetry")
+    number = _chosen(path, sorted({system for system, _ in sources}), system_id, "--system-id")
+    source = max((one for one in sources if one[0] == number), key=lambda one: (sources[one], -one[1]))
+    said = [m for m in kept if m.get_type() not in COMMANDS and _source(m) == source]
+    origin = _middle([(m.lat, m.lon) for m in said if m.get_type() == POSITION])
+    tops = [[(_time_s(m), m.param_value) for m in said if _parameter(m) == name] for name in TOP_SPEED]
+    has_attitude = any(m.get_type() == "ATTITUDE" for m in said)
+    streams, heading_deg = Streams(path.stem, tell), math.nan
+    for m in kept:
+        kind, time_s = m.get_type(), _time_s(m)
+        streams.clock(time_s)
+        if kind in COMMANDS:
+            if m.target_system in (0, number):
+                streams.add_all(time_s, **_command(m, tops, time_s))
+        elif _source(m) != source:
+            continue
+        elif kind == "ATTITUDE":
+            heading_deg = math.degrees(m.yaw)
+            streams.add("heading", time_s, heading_deg)
+        elif kind == POSITION and _is_place(m.lat, m.lon):
+            course_deg = heading_deg if m.hdg == NO_HEADING else m.hdg / 100.0
+            if m.hdg != NO_HEADING and not has_attitude:
+                heading_deg = course_deg
+                streams.add("heading", time_s, heading_deg)
+            x, y = place_m(origin, m.lat / 1e7, m.lon / 1e7)
+            way = math.radians(course_deg)
+            streams.add_all(time_s, x=x, y=y, speed=(m.vx * math.cos(way) + m.vy * math.sin(way)) / 100.0)
+    return streams.runs(TLOG_NAMES)
+
+
+def _command(m: Any, tops: Sequence[Sequence[tuple[float, float]]], time_s: float) -> dict[str, float]:
+    """Speed and heading that a command asks for; empty: it asks for something else."""
+    if m.get_type() == COMMANDS[1]:
+        if m.type_mask != MASK_VELOCITY_ONLY:
+            return {}
+        return {"told_heading": math.degrees(math.atan2(m.vy, m.vx)), "told_speed": math.hypot(m.vx, m.vy)}
+    if m.type_mask != MASK_IGNORES_RATES or not math.isfinite(top_mps := _top_mps(tops, time_s)):
+        return {}
+    w, x, y, z = m.q
+    yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    return {"told_heading": math.degrees(yaw), "told_speed": m.thrust * top_mps}
+
+
+def _top_mps(tops: Sequence[Sequence[tuple[float, float]]], time_s: float) -> float:
+    """Speed of full thrust at a time; before it was first told only if it is the same all along, else NaN."""
+    for told in tops:
+        at = bisect_right([when_s for when_s, _ in told], time_s)
+        known = told[at - 1 : at] or (told[:1] if len({value for _, value in told}) == 1 else [])
+        if not known and told:
+            return math.nan
+        if known and known[0][1] > 0.0:
+            return known[0][1]
+    return math.nan
+
+
+def _parameter(message: Any) -> str:
+    return str(message.param_id).rstrip("\0") if message.get_type() == "PARAM_VALUE" else ""
+
+
+def _time_s(message: Any) -> float:
+    return float(message._timestamp)
+
+
+def _source(message: Any) -> tuple[int, int]:
+    return message.get_srcSystem(), message.get_srcComponent()
+
+
+def _is_place(latitude: int, longitude: int) -> bool:
+    """Whether it is one, in 1e-7 deg: ArduPilot sends 0, 0 until it has a fix."""
+    return (latitude, longitude) != (0, 0) and abs(latitude) <= 900_000_000 and abs(longitude) <= 1_800_000_000
+
+
+def _middle(places: Sequence[tuple[int, int]]) -> tuple[float, float]:
+    """The median place, deg, of places in 1e-7 deg: no single odd one is the origin."""
+    fine = [place for place in places if _is_place(*place)]
+    latitude, longitude = np.median(np.array(fine), axis=0) / 1e7 if fine else (math.nan, math.nan)
+    return float(latitude), float(longitude)
+
+
+def place_m(origin: tuple[float, float], latitude_deg: float, longitude_deg: float) -> tuple[float, float]:
+    """East and north of an origin, m, on the sphere: over a log's few hundred metres as good as the ellipsoid."""
+    north = math.radians(latitude_deg - origin[0]) * EARTH_M
+    return math.radians(longitude_deg - origin[1]) * EARTH_M * math.cos(math.radians(origin[0])), north
+
+
+def read_bin(path: Path, tell: Tell) -> list[Run]:
+    """Read an ArduPilot log; of several GPS receivers the one that most often has a fix."""
+    kept = [message for message in _messages(path) if message.get_type() in ("POS", *BIN_FIELDS)]
+    origin = _middle([_raw_place(m) for m in kept if m.get_type() == "POS"])
+    receivers = Counter(getattr(m, "I", 0) for m in kept if m.get_type() == "GPS" and _has_fix(m))
+    receiver = max(receivers, key=lambda number: (receivers[number], -number), default=0)
+    streams = Streams(path.stem, tell)
+    for m in kept:
+        kind = m.get_type()
+        what, name = BIN_FIELDS.get(kind, ("", ""))
+        for needed in ("TimeUS", *([name] if name else ())):
+            if not hasattr(m, needed):
+                raise FitError(f"{path.name}: its {kind} messages have no {needed}; give a log of ArduPilot Rover 4")
+        time_s = float(m.TimeUS) / 1e6
+        streams.clock(time_s)
+        if kind == "POS" and _is_place(*_raw_place(m)):
+            x, y = place_m(origin, m.Lat, m.Lng)
+            streams.add_all(time_s, x=x, y=y)
+        elif what and (kind != "GPS" or (_has_fix(m) and getattr(m, "I", 0) == receiver)):
+            streams.add(what, time_s, float(getattr(m, name)))
+    return streams.runs(BIN_NAMES, sampled=True)
+
+
+def _raw_place(message: Any) -> tuple[int, int]:
+    return round(message.Lat * 1e7), round(message.Lng * 1e7)
+
+
+def _has_fix(message: Any) -> bool:
+    return int(getattr(message, "Status", FIX_3D)) >= FIX_3D
+
+
+def _messages(path: Path) -> Iterator[Any]:
+    os.environ.setdefault("MAVLINK20", "1")
+    from pymavlink import mavutil
+
+    try:
+        log = mavutil.mavlink_connection(str(path), robust_parsing=True)
+        while (message := log.recv_match()) is not None:
+            yield message
+        log.close()
+    except Exception as error:  # pymavlink raises whatever its parsers stumble over
+        raise FitError(f"{path.name} cannot be read as {path.suffix} ({error}); give an unbroken log") from None
 
 
 def _check_enough(runs: Sequence[Run], pieces: int) -> None:

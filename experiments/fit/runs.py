@@ -227,11 +227,12 @@ class Streams:
         for what, value in values.items():
             self.add(what, time_s, value)
 
-    def runs(self, names: Mapping[str, str], sampled: bool = False) -> list[Run]:
+    def runs(self, names: Mapping[str, str], holds_s: float = SPENT_S, sampled: bool = False) -> list[Run]:
         """Put the values together to runs that do not contradict themselves.
 
         Args:
             names: message names that would have told each of `NEEDED`, for the words of an error.
+            holds_s: how long a command is in force, s.
             sampled: whether commands were written down at times of the log's own instead of when they were given.
 
         Raises:
@@ -250,9 +251,9 @@ class Streams:
                     f"{self.name}: {NEEDED[what]} come every {every_s:.2g} s, from which no delay can be told; "
                     f"log them at least every {most_s:g} s"
                 )
-        return consistent(self.name, [run for part in parts for run in self._on_grid(part)], self._tell)
+        return consistent(self.name, [run for part in parts for run in self._on_grid(part, holds_s)], self._tell)
 
-    def _on_grid(self, part: Mapping[str, Array]) -> list[Run]:
+    def _on_grid(self, part: Mapping[str, Array], holds_s: float) -> list[Run]:
         """Runs of a part: the grid, cut wherever something is not known."""
         runs, times = [], part["x"][0]
         gaps = np.flatnonzero(np.diff(times) > SPENT_S + SAME_S) + 1
@@ -260,7 +261,7 @@ class Streams:
             first_s, last_s = times[begin], times[end - 1]
             grid = first_s + STEP_S * np.arange(int((last_s - first_s) / STEP_S + SAME_S) + 1)
             seen = np.column_stack([_between(part[what], grid, what) for what in SEEN])
-            told = np.column_stack([_held(part[what], grid) for what in TOLD])
+            told = np.column_stack([_held(part[what], grid, holds_s) for what in TOLD])
             for a, b in spans(np.isfinite(seen).all(axis=1) & np.isfinite(told).all(axis=1)):
                 if (b - a) * STEP_S >= SHORTEST_S:
                     runs.append(Run.of(self.name, float(grid[a]), seen[a:b], told[a:b]))
@@ -281,8 +282,8 @@ def _between(stream: Array, times: Array, what: str) -> Array:
     return np.where(apart <= SPENT_S, np.interp(times, stream[0], values), np.nan)
 
 
-def _held(stream: Array, times: Array) -> Array:
+def _held(stream: Array, times: Array, holds_s: float) -> Array:
     """The last value told before each time, NaN where that is too long ago."""
     last = np.searchsorted(stream[0], times + SAME_S, side="right") - 1
-    known = (last >= 0) & (times - stream[0][np.maximum(last, 0)] <= SPENT_S)
+    known = (last >= 0) & (times - stream[0][np.maximum(last, 0)] <= holds_s)
     return np.where(known, stream[1][np.maximum(last, 0)], np.nan)

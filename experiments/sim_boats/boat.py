@@ -72,7 +72,8 @@ class Boat:
         self.faults = Faults(self.autopilot, self.down, self.up, frame, seeds[3])
         self.community: Community | None = None
         if spec.address is not None and spec.address.startswith(MOOS):
-            self.community = Community(spec.name, spec.address, frame, setting.warp)
+            precbf = platform if spec.gate == "pid" else None
+            self.community = Community(spec.name, spec.address, frame, setting.warp, precbf)
         self.order: Order = Keep()
 
     @property

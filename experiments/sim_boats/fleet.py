@@ -18,6 +18,7 @@ from steerclear.env.record import DEFAULT_SEPARATION_M, Record
 from steerclear.experiments.deploy.referee import game_config
 from steerclear.shield.bridge.clock import Clock, MonotonicClock
 from steerclear.shield.bridge.fleet_file import FleetFile, load_fleet
+from steerclear.shield.bridge.fleet_settings import MoosLinkSettings
 from steerclear.shield.bridge.frame import FieldFrame
 from steerclear.shield.bridge.session import key_of
 from steerclear.shield.compat import Self
@@ -67,6 +68,7 @@ def boats_of(fleet: FleetFile, opponents: str, hulls: Hulls | None = None) -> li
                 address=None if link is None else link.address,
                 policy=opponents if plays and not ours else "",
                 start=None if plays else beside,
+                gate=link.gate if isinstance(link, MoosLinkSettings) else "helm",
             )
         )
     return boats

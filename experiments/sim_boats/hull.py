@@ -16,7 +16,7 @@ from steerclear.shield.bridge.frame import FieldFrame
 from steerclear.shield.platforms import Platform, fresh_state, step_boat
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.actuator import actuate
-from steerclear.shield.platforms.usv import wrap_degrees
+from steerclear.shield.platforms.usv import advance_hull, wrap_degrees
 
 from .settings import Water
 
@@ -63,11 +63,19 @@ class Keep:
 
 
 @dataclass(frozen=True)
+class Actuate:
+    """Rudder and thrust themselves, percent; only thrust ahead."""
+
+    rudder: float
+    thrust: float
+
+
+@dataclass(frozen=True)
 class Coast:
     """Motors off."""
 
 
-Order = Steer | Bear | Turn | Keep | Coast
+Order = Steer | Bear | Turn | Keep | Actuate | Coast
 
 
 class Hull:
@@ -145,6 +153,11 @@ class Hull:
                 self._run(speed_mps, step_boat, error_deg)
             case Turn(rate_rads, speed_mps):
                 self._run(speed_mps, actuate, math.degrees(rate_rads) * STEP_S)
+            case Actuate(rudder, thrust):
+                limit = min(float(self.params[L.MAX_RUDDER]), 100.0)
+                self.state[L.RUDDER] = min(max(rudder, -limit), limit)
+                self.state[L.THRUST] = min(max(thrust, 0.0), float(self.params[L.MAX_THRUST]))
+                self._move(advance_hull)
             case Keep(back_up_m):
                 self._keep(back_up_m)
             case Coast():

@@ -40,6 +40,7 @@ class SimBoat:
         policy: scripted policy that drives the boat while nobody commands it by its link; empty: without commands it
             stays where it is.
         start: x m, y m, heading deg in the field; None: the game's start place.
+        gate: of a boat that runs MOOS: where its commander sits, "helm" or "pid", as in FLEET.yaml.
     """
 
     name: str
@@ -49,6 +50,7 @@ class SimBoat:
     address: str | None = FREE
     policy: str = ""
     start: tuple[float, float, float] | None = None
+    gate: str = "helm"
 
 
 @dataclass(frozen=True)

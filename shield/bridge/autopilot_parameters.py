@@ -22,8 +22,8 @@ ASKED = (
     "OA_TYPE", "SAIL_ENABLE", "FS_ACTION", "BATT_FS_LOW_ACT", "BATT_FS_CRT_ACT",
 )  # fmt: skip
 """Parameters that are looked at here, besides WP_SPEED."""
-FENCE_ASKED = ("FENCE_MARGIN", "FENCE_ACTION", "AVOID_MARGIN")
-"""Those of a fence that is on."""
+FENCE_ASKED = ("FENCE_TYPE", "FENCE_RADIUS", "FENCE_MARGIN", "FENCE_ACTION", "AVOID_MARGIN")
+"""Those of a fence that is on, see `fence`."""
 
 HOLD = 2
 SAILS = {1: "RTL", 3: "SmartRTL or RTL", 4: "SmartRTL or Hold", 6: "Loiter or Hold"}

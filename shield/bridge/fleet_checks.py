@@ -188,12 +188,20 @@ def _links(fleet: FleetFile) -> Iterator[str]:
 
 
 def _moos_link(fleet: FleetFile, name: str, link: MoosLinkSettings) -> Iterator[str]:
-    """Fast enough for its PIDs."""
+    """Fast enough for its PIDs; and somebody knows what stops it once its gate died: its PID, or else the file."""
     if fleet.rate_hz < LEAST_MOOS_HZ:
         yield (
             f"rate_hz is {fleet.rate_hz:g} and {name} runs MOOS, whose PIDs want commands at {LEAST_MOOS_HZ:g} Hz: "
             f"give {LEAST_MOOS_HZ:g} or more"
         )
+    answers = (link.thrust_timeout_s is not None) + link.nothing_stops_it
+    if link.gate == "pid" and answers != 1:
+        yield (
+            f"{name}: with gate: pid no PID stops it when the gate dies; give its link thrust_timeout_s (s "
+            "after which its actuators take thrust off by themselves) or nothing_stops_it: true, or take gate: helm"
+        )
+    if link.gate == "helm" and answers:
+        yield f"{name}: thrust_timeout_s and nothing_stops_it are for gate: pid; leave them out"
 
 
 def _contacts(fleet: FleetFile) -> Iterator[str]:

@@ -22,7 +22,7 @@ from .fleet_checks import check_fleet, platform_of, shield_config
 from .fleet_settings import BoatSettings, FleetSettings, explain
 from .fleet_yaml import MOST_BYTES, read_settings
 from .frame import FieldFrame
-from .static_obstacles import check_obstacles, corners_m
+from .static_obstacles import corners_m, read_obstacles
 
 VERSION = 1  # of the format
 OUTSIDE_TEAM = 2  # team number of boats outside the game that are nobody's
@@ -199,7 +199,7 @@ def parse_fleet(text: str, where: str = "FLEET.yaml", folder: Path | None = None
         if folder is not None:
             boats = tuple(boat if boat.platform in fleet.platforms else _rooted(boat, folder) for boat in fleet.boats)
             fleet = fleet.model_copy(update={"boats": boats, "log_dir": folder / fleet.log_dir})
-        check_obstacles(fleet)
+        fleet = fleet.model_copy(update={"obstacles": read_obstacles(fleet)})
         check_fleet(fleet)
     except ValidationError as error:
         raise FleetFileError(f"{where}: {explain(error, FleetFile)}") from None

@@ -86,10 +86,10 @@ class Geofence(Section):
 
 
 class Obstacle(Section):
-    """Shore, pier, shallow or keep-out area that no command may lead a boat across; one of its three forms.
+    """Shore, pier, shallow or keep-out area that no command may lead a boat across; one of its four forms.
 
     ``polygon_m``: corners [x, y] in the field's frame. ``polygon_deg``: corners [latitude, longitude]. ``circle_m``:
-    [x, y, radius].
+    [x, y, radius]. ``geojson``: path of a GeoJSON file, whose polygons and lines are all taken.
     """
 
     name: Name | None = None
@@ -100,6 +100,7 @@ class Obstacle(Section):
         None, min_length=3, description="give corners [latitude, longitude] in deg, at least three"
     )
     circle_m: tuple[Metres, Metres, Length] | None = Field(None, description="give [x, y, radius] in m")
+    geojson: Place | None = Field(None, description="give the path of a GeoJSON file")
 
 
 class LinkSettings(Section):
@@ -119,18 +120,22 @@ class LinkSettings(Section):
 class MoosLinkSettings(LinkSettings):
     """How a boat that runs MOOS-IvP is reached; ``link: moos://HOST:PORT`` alone takes the defaults.
 
-    ``gate``: where the shield sits, between helm and PID. ``prefix``: what the helm puts before its DESIRED_*.
-    ``corner_m``: the field's corner on the mission's local grid, x east, y north. ``mission``: the boat's .moos file,
-    which checks before a start read.
+    ``gate``: where the shield sits: "helm" between helm and PID, "pid" between PID and actuators. ``prefix``: what the
+    helm puts before its DESIRED_*. ``corner_m``: the field's corner on the mission's local grid, x east, y north.
+    ``mission``: the boat's .moos file, which checks before a start read. ``thrust_timeout_s``: after how long without
+    posts the actuators behind gate "pid" take thrust off by themselves. ``nothing_stops_it``: true acknowledges that
+    they do not.
     """
 
     kind: Literal["moos"] = Field(description="the kind of link: moos")
     address: str = Field(pattern=r"^moos://", max_length=200, description='give "moos://HOST:PORT"')
     system_id: int = Field(1, ge=1, le=1, description="leave system_id out: MOOS has none")
-    gate: Literal["helm"] = Field("helm", description="give helm, the only gate: no PID stops a boat behind its PID")
+    gate: Literal["helm", "pid"] = Field("helm", description="give helm or pid")
     prefix: str = Field("RAW_", pattern=r"^[A-Z0-9_]{1,16}$", description="give the helm_prefix, such as RAW_")
     corner_m: tuple[Metres, Metres] = Field((0.0, 0.0), description="give [x, y] of the field's corner in m")
     mission: Place | None = Field(None, description="give the path of the boat's .moos file")
+    thrust_timeout_s: float | None = Field(None, gt=0.0, le=10.0, description="give seconds, at most 10")
+    nothing_stops_it: bool = Field(False, description="give true, or leave it out")
 
 
 class BoatSettings(Section):

@@ -16,6 +16,7 @@ from ..frame import FieldFrame
 from ..messages import FAILSAFE, PILOT
 from .commands import GUIDED, MODES, TOP_SPEED, AttitudeRoute, Dialogue, Route, command
 from .connection import AUTOPILOT, Endpoint
+from .fence import FenceReader
 from .telemetry import Streams, Telemetry
 
 HEARTBEAT_LOST_S = 3.5
@@ -99,6 +100,7 @@ class Autopilot:
 
     Attributes:
         dialogue: questions and answers; ``dialogue.changed`` is the lock of everything here.
+        fence: its own fence, as far as it was asked for.
         heartbeat: the last; None before the first.
         route: how heading and speed are commanded; None until prepared, or when that is known no more.
         others: system ids of other vehicles heard on the wire.
@@ -126,6 +128,7 @@ class Autopilot:
         self.target = (system_id, AUTOPILOT)
         self.dialogue = Dialogue(self.target, self.send, clock)
         self.streams, self.telemetry = Streams(rate_hz), Telemetry(frame)
+        self.fence = FenceReader(self.target, self.send)
         self.heartbeat: Heartbeat | None = None
         self.route: Route | None = None
         self.expects_guided, self.released, self.released_by = False, "", ""
@@ -202,6 +205,7 @@ class Autopilot:
                 self._note("", f"{self.boat}: {text}" if text else "", received_s)
                 if self.telemetry.clock.starts != starts:
                     self.streams.restart()
+                self.fence.hear(message)
             for text in self.dialogue.hear(message, received_s):
                 self._hear_words(text, received_s)
             self.dialogue.changed.notify_all()

@@ -29,13 +29,14 @@ from .commands import (
     mode_request,
 )
 from .connection import Endpoint
+from .fence import FenceZone, Point
 
 LOG = logging.getLogger(__name__)
 
 STILL_MPS = 0.3
 STOP_S, HOLD_S = 12.0, 4.0
 """A boat at 3 m/s that is left alone needs 5.6 s to stop."""
-_RESEND_S, _LEARN_S, _TRY_AGAIN_S = 0.1, 10.0, 2.0
+_RESEND_S, _LEARN_S, _TRY_AGAIN_S, _FENCE_S = 0.1, 10.0, 2.0, 5.0
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,8 @@ class LinkHealth:
         other_commander_s: when somebody else was last seen commanding the boat, s; -inf: never.
         faults: of the whole wire since it was opened, by kind.
         fix_fault: why its positions are not believed for want of a fix, in words; empty: they may be.
+        fence: zones of the autopilot's own fence; None: not heard, or not asked for because the fence is off.
+        home_deg: latitude and longitude of its home, deg; None: not heard.
     """
 
     rates_hz: Mapping[str, float]
@@ -73,6 +76,8 @@ class LinkHealth:
     other_commander_s: float
     faults: Mapping[str, int]
     fix_fault: str = ""
+    fence: tuple[FenceZone, ...] | None = None
+    home_deg: Point | None = None
 
 
 class MavlinkLink(Link):
@@ -137,10 +142,15 @@ class MavlinkLink(Link):
 
     def learn(self, timeout_s: float) -> None:
         """Ask what the autopilot can do and for the parameters that checks look at; what it does not answer is left."""
-        patience, dialogue = Patience(self._clock, timeout_s), self.autopilot.dialogue
+        patience, dialogue, fence = Patience(self._clock, timeout_s), self.autopilot.dialogue, self.autopilot.fence
         dialogue.learn(TOP_SPEED, ASKED, patience)
-        if dialogue.parameters.get("FENCE_ENABLE", 0.0) != 0.0:
-            dialogue.learn(TOP_SPEED, FENCE_ASKED, patience)
+        if dialogue.parameters.get("FENCE_ENABLE", 0.0) == 0.0:
+            return
+        dialogue.learn(TOP_SPEED, FENCE_ASKED, patience)
+        patience = Patience(self._clock, _FENCE_S)
+        while not fence.is_known and not patience.is_over:
+            fence.ask()
+            dialogue.wait(lambda: fence.is_known, patience.part(_RESEND_S))
 
     def prepare(self, timeout_s: float, is_off: Callable[[], bool] = never) -> None:
         """Read what the autopilot can do and choose the route; GUIDED; arm, all checks on.
@@ -266,6 +276,8 @@ class MavlinkLink(Link):
                 other_commander_s=boat.commanded_s,
                 faults=dict(self.endpoint.faults),
                 fix_fault=seen.fix.fault(now_s)[1],
+                fence=boat.fence.zones,
+                home_deg=boat.fence.home_deg,
             )
 
     def _send(self, route: str, encoded: Encoded) -> Sent:

@@ -18,7 +18,7 @@ from ..link_checks import LONGEST_TRIP_S, OLDEST_S, WATCH_S, Watch, check_spread
 from ..messages import BoatReading
 from ..preflight_checks import Check, Found, checks_by_kind
 from .client import Health
-from .contacts import REFUSED, VARIABLES
+from .nav import REFUSED, VARIABLES
 from .vehicle import MoosLink, client_name
 
 APART_M = 5.0
@@ -144,17 +144,28 @@ def check_mission(watched: Watched) -> Found:
     except (OSError, ValueError) as error:
         return False, f"cannot read {settings.mission} ({error}); correct the link's mission", {}
     port, platform = int(settings.address.rpartition(":")[2]), watched.fleet.platform_of[link.boat]
-    faults = mission_faults(mission, port, link.client.warp, platform, settings.prefix)
+    faults = mission_faults(mission, port, link.client.warp, platform, settings.gate, settings.prefix)
     return not faults, "; ".join(faults) or "prefix, ticks, thresholds and gains fit", {}
 
 
 def check_stop(watched: Watched) -> Found:
     """What is behind the gate when it dies, and after how long that stops the boat."""
-    mission = watched.mission()
-    pids = [name for name in PIDS if name in mission]
-    seconds = number(mission, pids[0], "tardy_helm_threshold", LONGEST_S) if pids else LONGEST_S
-    source = f"{pids[0]} takes" if pids else "its PID, if set as the docs say, takes"
-    return True, f"when the gate dies, {source} thrust off {seconds:g} s after the last command", {"stop_s": seconds}
+    settings, mission = watched.settings, watched.mission()
+    if settings.gate == "helm":
+        pids = [name for name in PIDS if name in mission]
+        seconds = number(mission, pids[0], "tardy_helm_threshold", LONGEST_S) if pids else LONGEST_S
+        source = f"{pids[0]} takes" if pids else "its PID, if set as the docs say, takes"
+        text = f"when the gate dies, {source} thrust off {seconds:g} s after the last command"
+        return True, text, {"stop_s": seconds}
+    keeps = [name for name in SIMULATORS if name in mission]
+    if settings.thrust_timeout_s is not None and keeps:
+        text = f"thrust_timeout_s is {settings.thrust_timeout_s:g}, but {keeps[0]} of its mission keeps its last thrust"
+        return False, f"{text} for ever; give nothing_stops_it: true instead, or take gate: helm", {}
+    if settings.thrust_timeout_s is not None:
+        text = f"when the gate dies, its actuators take thrust off after {settings.thrust_timeout_s:g} s, by the file"
+        return True, f"{text}: see that with your own eyes before a run", {"stop_s": settings.thrust_timeout_s}
+    text = "NOTHING stops it when the gate dies: its last thrust stays on, as the fleet file acknowledges"
+    return True, f"{text}; keep something at hand that cuts its power", {"stop_s": math.inf}
 
 
 KINDS: Mapping[str, Callable[[Watched], Found]] = {
@@ -180,9 +191,9 @@ def parse_mission(text: str) -> Mission:
     return {"": entries(_BLOCK.sub("", text)), **{name: entries(body) for name, body in _BLOCK.findall(text)}}
 
 
-def mission_faults(mission: Mission, port: int, warp: float, platform: Platform, prefix: str) -> list[str]:
+def mission_faults(mission: Mission, port: int, warp: float, platform: Platform, gate: str, prefix: str) -> list[str]:
     """Everything in a boat's mission that would undo the shield, each with its remedy; ``port``: of its MOOSDB."""
-    return list(_faults(mission, port, warp, platform, prefix))
+    return list(_faults(mission, port, warp, platform, gate, prefix))
 
 
 def number(mission: Mission, app: str, key: str, otherwise: float) -> float:
@@ -193,13 +204,13 @@ def number(mission: Mission, app: str, key: str, otherwise: float) -> float:
         return math.nan
 
 
-def _faults(mission: Mission, port: int, warp: float, platform: Platform, prefix: str) -> Iterator[str]:
+def _faults(mission: Mission, port: int, warp: float, platform: Platform, gate: str, prefix: str) -> Iterator[str]:
     top, helm, pids = mission.get("", {}), mission.get("pHelmIvP"), [name for name in PIDS if name in mission]
     if number(mission, "", "serverport", port) != port:
         yield f"ServerPort is {top['serverport']} and the link's port {port}: give both the same"
     if not math.isclose(number(mission, "", "moostimewarp", 1.0), warp):
         yield f"MOOSTimeWarp is {top.get('moostimewarp', '1')} and this run's --speed {warp:g}: give both the same"
-    if helm is not None and helm.get("helm_prefix", "") != prefix:
+    if helm is not None and gate == "helm" and helm.get("helm_prefix", "") != prefix:
         yield f"pHelmIvP writes DESIRED_* itself: set helm_prefix = {prefix}"
     if helm is not None and helm.get("allow_override", "true").lower() == "false":
         yield "pHelmIvP has allow_override = false, so nobody can take the boat by hand: set it to true"

@@ -15,7 +15,7 @@ from ..fleet_file import FleetFile
 from ..fleet_settings import BoatSettings, MoosLinkSettings
 from ..messages import Answer, Link, LinkMaker, WantedSource
 from .contacts import MoosContacts
-from .drivers import HelmGate
+from .gates import HelmGate, PidGate
 from .vehicle import MoosLink
 
 POLICY = "moos"
@@ -38,13 +38,13 @@ class MoosLinks(LinkMaker):
         if not isinstance(settings, MoosLinkSettings):
             raise ValueError(f"boat {boat.name} has no link of MOOS")
         host, port = address_of(settings.address.removeprefix(MOOS), f"boat {boat.name!r}: link")
-        frame = self._fleet.frame
-        gate = HelmGate(frame, settings.prefix)
-        corner_m = settings.corner_m
+        frame, platform = self._fleet.frame, self._fleet.platform_of[boat.name]
+        gate = PidGate(platform, self._fleet.dt_s) if settings.gate == "pid" else HelmGate(frame, settings.prefix)
+        corner_m, prefix = settings.corner_m, settings.prefix
         error_m = self._fleet.shield_config.position_error_m
         contacts = self.contacts.setdefault(corner_m, MoosContacts(frame, corner_m, self._fleet.names, error_m))
         place = (boat.name, host.strip("[]"), port)
-        return MoosLink(*place, gate, frame, self._clock, contacts, corner_m=corner_m)
+        return MoosLink(*place, gate, frame, self._clock, contacts, corner_m=corner_m, prefix=prefix)
 
     def sources(self) -> tuple[MoosContacts, ...]:
         """Who tells of other boats."""

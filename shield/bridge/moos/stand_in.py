@@ -2,7 +2,8 @@
 
 `StandInDb` keeps what clients of ours can see of a real one: the handshake, mail to all who registered, periods, the
 type of a variable fixed by its first write, heartbeats echoed, silent clients dropped. `StandInPid` says when a PID
-obeys, as pMarinePID was measured to; its control law is the platform's own.
+obeys, as pMarinePID was measured to; its control law is the platform's own. `StandInActuators` is what a boat has
+behind it whose PID is made to post *_PRECBF.
 """
 
 from __future__ import annotations
@@ -16,7 +17,10 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-from .drivers import OVERRIDES, HelmGate
+from ...platforms import Platform
+from ...platforms import layout as L
+from .drivers import OVERRIDES
+from .gates import SUFFIX, Autopilot, HelmGate, PidGate
 from .wire import (
     DATA,
     DOUBLE,
@@ -226,3 +230,44 @@ class StandInPid:
         """Heading, deg true, and speed, m/s, that it steers by now; None: thrust off."""
         tardy = now_s - self.heard_s > TARDY_S
         return None if tardy or self.overridden or self.broken else (self.heading_deg, self.speed_mps)
+
+
+class StandInActuators:
+    """Rudder and thrust that obey the plain names, and the control law of the PID that posts *_PRECBF before them.
+
+    As uSimMarine, they keep what they were last told, however old it is.
+
+    Args:
+        platform: of the boat.
+        dt_s: between two looks of the PID, s.
+
+    Attributes:
+        rudder, thrust: as last told, percent.
+
+    Raises:
+        ConfigError: the platform has no rudder and thrust.
+    """
+
+    def __init__(self, platform: Platform, dt_s: float) -> None:
+        self._autopilot = Autopilot(platform, dt_s)
+        self.rudder = self.thrust = 0.0
+        self._heard_s = -math.inf
+
+    def hear(self, message: Message, now_s: float) -> None:
+        """A variable was written at MOOS time ``now_s``."""
+        if message.key in PidGate.outputs and message.data == DOUBLE and math.isfinite(message.value):
+            self._heard_s = now_s
+            setattr(self, "rudder" if message.key == "DESIRED_RUDDER" else "thrust", message.value)
+
+    def is_driven(self, now_s: float) -> bool:
+        """Whether somebody posts the plain names at this moment."""
+        return now_s - self._heard_s <= TARDY_S
+
+    def wants(self, command: tuple[float, float] | None, heading_deg: float, speed_mps: float) -> dict[str, float]:
+        """What the PID posts for a heading, deg, and a speed, m/s, given the boat's own; thrust off without them."""
+        values = (0.0, 0.0)
+        if command is None:
+            self._autopilot.row[[L.RUDDER, L.THRUST]] = values
+        else:
+            values = self._autopilot.step(*command, heading_deg, speed_mps)
+        return {f"{name}{SUFFIX}": value for name, value in zip(PidGate.outputs, values, strict=True)}

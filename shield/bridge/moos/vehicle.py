@@ -14,11 +14,12 @@ from ...exceptions import LinkError, LinkRefused
 from ..clock import Clock
 from ..frame import TWO_PI, FieldFrame
 from ..messages import NEVER_S, PILOT, BoatReading, Link, Sent, check_finite, never
-from . import drivers
+from . import drivers, nav
 from .client import Health, MoosClient
-from .contacts import PLACE, MoosContacts, Navigation
-from .contacts import VARIABLES as NAVIGATION
-from .drivers import Drivers, HelmGate, Nominal
+from .contacts import MoosContacts
+from .drivers import Drivers
+from .gates import Gate, Nominal
+from .nav import Navigation
 from .wire import Message, WireError
 
 LOG = logging.getLogger(__name__)
@@ -29,8 +30,9 @@ ALIVE_S = 1.5
 REST_MPS, REST_S = 0.3, 3.0
 """A boat this slow lies still; how long `close` waits for it, real s."""
 POLL_S = 0.05
+HANGS_S = 1.0
+"""Without a command of ours for so long, MOOS s, thrust is taken off actuators that would keep the last one."""
 MOST_TEXTS = 32
-LET_GO = "its PID gets no more commands and drops thrust by itself"
 SAY_AGAIN_S, ALIKE = 10.0, 40
 """A text is repeated after this long, s of the loop's clock; texts that begin alike are one."""
 
@@ -55,6 +57,7 @@ class MoosLink(Link):
         clock: the loop's; as many times faster than real time as the community's MOOSTimeWarp says.
         contacts: takes the NODE_REPORTs that reach this boat.
         corner_m: the field's corner on the boat's local grid, m.
+        prefix: what the helm puts before its own DESIRED_*, for words.
     """
 
     def __init__(
@@ -62,26 +65,27 @@ class MoosLink(Link):
         boat: str,
         host: str,
         port: int,
-        gate: HelmGate,
+        gate: Gate,
         frame: FieldFrame,
         clock: Clock,
         contacts: MoosContacts,
         *,
         corner_m: tuple[float, float] = (0.0, 0.0),
+        prefix: str = "RAW_",
     ) -> None:
         self.boat, self.gate = boat, gate
         self._clock, self._contacts = clock, contacts
         self._lock = threading.Lock()
         self._navigation = Navigation(frame, corner_m)
-        self._drivers = Drivers(client_name(boat), gate.outputs, gate.prefix)
+        self._drivers = Drivers(client_name(boat), gate.outputs, prefix)
         self._faults: Counter[str] = Counter()
         self._texts: deque[str] = deque(maxlen=MOST_TEXTS)
         self._told_fault = ""
         self._said_s: dict[str, float] = {}
-        self._last_rad = 0.0
+        self._last_rad, self._sent_s = 0.0, math.inf
         self._prepared = self._closed = False
         self.writers: dict[str, set[str]] = {}
-        names = (*NAVIGATION, *PLACE, *drivers.VARIABLES, *gate.inputs, *gate.outputs, REPORT)
+        names = (*nav.VARIABLES, *nav.PLACE, *drivers.VARIABLES, *gate.inputs, *gate.outputs, REPORT)
         self.client = MoosClient(client_name(boat), host, port, clock, names, self._hear, self._forget)
 
     def connect(self, timeout_s: float) -> None:
@@ -167,9 +171,13 @@ class MoosLink(Link):
         check_finite(self.boat, heading_rad, speed_mps)
         now_s, route = self._clock.now_s(), " and ".join(self.gate.outputs)
         with self._lock:  # also round the post: what is heard meanwhile comes after it
-            delivered = self.client.post(self.gate.encode(heading_rad, speed_mps))
+            why_not = self._drivers.why_not()
+            if why_not and self.gate.at_rest and speed_mps != 0.0:
+                return Sent(self.boat, now_s, heading_rad, speed_mps, f"none: {why_not}", False)
+            delivered = self.client.post(self.gate.encode(heading_rad, speed_mps, self._reading(now_s)))
             self._last_rad = heading_rad
             if delivered:
+                self._sent_s = now_s
                 self._drivers.posted(now_s)
         return Sent(self.boat, now_s, heading_rad, speed_mps, route, delivered)
 
@@ -241,12 +249,21 @@ class MoosLink(Link):
             if "override" in reading.why_not.lower():
                 return f"left as it is: {reading.why_not}"
             if not self.stop().delivered:
-                return f"cannot be told to stop ({reading.why_not}); its PID stops it 2 s after our last command"
+                stops = "take it over by hand" if self.gate.at_rest else "its PID stops it 2 s after our last command"
+                return f"cannot be told to stop ({reading.why_not}); {stops}"
             if abs(reading.speed_mps) < REST_MPS and reading.velocity_age_s < 1.0:
-                return f"stopped; {LET_GO}"
+                return f"stopped; {self._let_go()}"
             if time.monotonic() > end_s:
-                return f"told to stop, makes {reading.speed_mps:.1f} m/s yet; {LET_GO}"
+                return f"told to stop, makes {reading.speed_mps:.1f} m/s yet; {self._let_go()}"
             time.sleep(POLL_S)
+
+    def _let_go(self) -> str:
+        """What holds thrust at 0 from now on, in words."""
+        if not self.gate.at_rest:
+            return "its PID gets no more commands and drops thrust by itself"
+        if self.client.post(self.gate.at_rest):
+            return "thrust 0 was posted last, which its actuators keep"
+        return "thrust 0 was not delivered: take it over by hand, its actuators keep the last command"
 
     def _hear(self, message: Message, received_s: float) -> None:
         """Take mail in; in the client's thread."""
@@ -255,7 +272,7 @@ class MoosLink(Link):
             sources = self.writers.setdefault(key, set())
             if len(sources) < MOST_TEXTS:
                 sources.add(message.source)
-            is_place = key in NAVIGATION or key in PLACE
+            is_place = key in nav.VARIABLES or key in nav.PLACE
             text = ""
             if not math.isfinite(true_s) and (is_place or key == REPORT):
                 return  # MOOS time is not known yet
@@ -267,8 +284,20 @@ class MoosLink(Link):
             elif key in self.gate.inputs:
                 self.gate.hear(message, received_s)
             else:
+                obeyed = not self._drivers.why_not()
                 text = self._drivers.hear(message, received_s, received_s - true_s)
+                if obeyed and self._drivers.why_not():
+                    self._rest()  # who takes the boat must not inherit our last thrust
+            if self.gate.at_rest and received_s - self._sent_s > HANGS_S and not self._drivers.why_not():
+                self._say(f"no command for {HANGS_S:g} s: the loop hangs", received_s)
+                self._rest()
             self._say(text, received_s)
+
+    def _rest(self) -> None:
+        """Take thrust off actuators that would keep our last command, once; the lock is held."""
+        if self.gate.at_rest and math.isfinite(self._sent_s):
+            self._sent_s = math.inf
+            self.client.post(self.gate.at_rest)
 
     def _say(self, text: str, now_s: float) -> None:
         """Keep a text for the operator, unless one like it was said lately."""

@@ -1,10 +1,16 @@
-"""Logs that tests write, of a simulated boat that was driven."""
+"""Logs of every kind that tests write, of a simulated boat that was driven."""
 
 import math
+import struct
 
 import numpy as np
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from steerclear.shield.platforms import fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L
+
+ORIGIN = (42.0, -71.0)
+EARTH_M = 6378137.0
+
 
 LEGS = [(2.0, 0.0), (2.0, 90.0), (1.0, 20.0), (2.5, -60.0), (0.0, -60.0), (2.0, 30.0)]
 
@@ -25,3 +31,74 @@ def drive(seconds=36.0, legs=LEGS, delay_steps=2, begin_mps=2.0):
 def as_csv(path, rows):
     head = "t_s,x_m,y_m,heading_deg,speed_mps,told_speed_mps,told_heading_deg\n"
     path.write_text(head + "".join(",".join(f"{value:.6f}" for value in row) + "\n" for row in rows))
+
+
+def as_alog(path, rows):
+    names = ("NAV_X", "NAV_Y", "NAV_HEADING", "NAV_SPEED", "DESIRED_SPEED", "DESIRED_HEADING")
+    lines = ["%% LOG FILE: made by a test", "0.0 APP_STARTED pLogger yes"]
+    for row in rows:
+        lines += [f"{row[0]:.3f} {name} src {value:.6f}" for name, value in zip(names, row[1:], strict=True)]
+    path.write_text("\n".join(lines) + "\n")
+
+
+def degrees_of(x_m, y_m):
+    north = ORIGIN[0] + math.degrees(y_m / EARTH_M)
+    return north, ORIGIN[1] + math.degrees(x_m / EARTH_M / math.cos(math.radians(ORIGIN[0])))
+
+
+def as_tlog(path, rows, systems=(1,)):
+    boat, ground = mavlink.MAVLink(None, 1, 1), mavlink.MAVLink(None, 255, 190)
+    with path.open("wb") as file:
+        for row in rows:
+            for system in systems:
+                boat.srcSystem = system
+                for message in messages_of(row, system):
+                    mav = ground if message.get_type().startswith("SET") else boat
+                    file.write(struct.pack(">Q", int(1e6 * (1.7e9 + row[0]))) + bytes(message.pack(mav)))
+
+
+def messages_of(row, system):
+    _, x, y, heading, speed, told_speed, told_heading = row
+    latitude, longitude = degrees_of(x, y)
+    yaw, half = math.radians(heading), math.radians(told_heading) / 2.0
+    north, east = speed * math.cos(yaw), speed * math.sin(yaw)
+    place = [round(1e7 * latitude), round(1e7 * longitude), 0, 0, round(100 * north), round(100 * east), 0]
+    return [
+        mavlink.MAVLink_param_value_message(b"WP_SPEED", 3.0, 9, 1, 0),
+        mavlink.MAVLink_attitude_message(0, 0.0, 0.0, yaw, 0.0, 0.0, 0.0),
+        mavlink.MAVLink_global_position_int_message(0, *place, round(100 * (heading % 360.0)) % 36000),
+        mavlink.MAVLink_set_attitude_target_message(
+            0, system, 1, 7, [math.cos(half), 0, 0, math.sin(half)], 0, 0, 0, told_speed / 3.0
+        ),
+    ]
+
+
+FORMATS = {  # name: (type, format, columns)
+    "FMT": (128, "BBnNZ", "Type,Length,Name,Format,Columns"),
+    "POS": (130, "QLL", "TimeUS,Lat,Lng"),
+    "ATT": (131, "Qf", "TimeUS,Yaw"),
+    "GPS": (132, "Qf", "TimeUS,Spd"),
+    "THR": (133, "Qf", "TimeUS,DesSpeed"),
+    "NTUN": (134, "Qf", "TimeUS,DesYaw"),
+}
+
+
+def as_bin(path, rows, left_out=()):
+    """An ArduPilot log: formats first, then the messages."""
+    with path.open("wb") as file:
+        for name, (number, letters, columns) in FORMATS.items():
+            size = 3 + (86 if name == "FMT" else 8 + (8 if name == "POS" else 4))
+            texts = name.encode(), letters.encode(), columns.encode()
+            file.write(b"\xa3\x95\x80" + struct.pack("<BB4s16s64s", number, size, *texts))
+        for time_s, x, y, heading, speed, told_speed, told_heading in rows:
+            latitude, longitude = degrees_of(x, y)
+            stamp = int(1e6 * (time_s + 100.0))
+            place = struct.pack("<Qii", stamp, round(1e7 * latitude), round(1e7 * longitude))
+            file.write(b"\xa3\x95" + bytes([130]) + place)
+            values = {"ATT": heading % 360.0, "GPS": speed, "THR": told_speed, "NTUN": told_heading % 360.0}
+            for name, value in values.items():
+                if name not in left_out:
+                    file.write(b"\xa3\x95" + bytes([FORMATS[name][0]]) + struct.pack("<Qf", stamp, value))
+
+
+WRITERS = {"csv": as_csv, "alog": as_alog, "tlog": as_tlog, "bin": as_bin}

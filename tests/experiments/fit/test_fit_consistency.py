@@ -2,11 +2,13 @@
 
 import math
 import re
+import struct
 
 import fit_logs
 import numpy as np
 import pytest
-from fit_logs import as_csv
+from fit_logs import FORMATS, WRITERS, as_alog, as_csv, degrees_of, messages_of
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from steerclear.experiments.fit.reading import read_logs
 from steerclear.experiments.fit.runs import FitError
 
@@ -18,6 +20,34 @@ def drive(legs=LEGS):
     return fit_logs.drive(100.0, legs, delay_steps=3, begin_mps=0.0)
 
 
+def as_tlog(path, rows, every=1, top=lambda t: 3.0, before_fix=0, component=None):
+    """A telemetry log: commands each row, positions every so many; first some positions without a fix."""
+    boat, ground = mavlink.MAVLink(None, 1, 1), mavlink.MAVLink(None, 255, 190)
+    with path.open("wb") as file:
+
+        def put(sender, message, time_s):
+            file.write(struct.pack(">Q", round(1e6 * (1.7e9 + time_s))) + bytes(message.pack(sender)))
+
+        for k in range(before_fix):
+            put(
+                boat, mavlink.MAVLink_global_position_int_message(0, 0, 0, 0, 0, 0, 0, 0, 0), k / 5.0 - before_fix / 5.0
+            )
+        told = None
+        for k, row in enumerate(rows):
+            _, attitude, place, command = messages_of(row, 1)
+            if top(row[0]) != told:
+                told = top(row[0])
+                put(boat, mavlink.MAVLink_param_value_message(b"WP_SPEED", told, 9, 1, 0), row[0])
+            command.thrust = row[5] / told
+            put(ground, command, row[0])
+            if k % every == 0:
+                put(boat, attitude, row[0])
+                put(boat, place, row[0])
+                if component is not None:
+                    put(mavlink.MAVLink(None, 1, component), mavlink.MAVLink_global_position_int_message(
+                        0, 100, 100, 0, 0, 0, 0, 0, 0), row[0])  # fmt: skip
+
+
 def read(path, rows, write, **more):
     """Runs of a log of those rows, and what was told to be left out."""
     said = []
@@ -25,10 +55,68 @@ def read(path, rows, write, **more):
     return read_logs([path], tell=said.append), said
 
 
-def test_commands_keep_their_own_times(tmp_path):
+def test_positions_before_a_fix_are_left_out(tmp_path):
     rows = drive()
-    runs, _ = read(tmp_path / "a.csv", rows, as_csv)
-    held = {run.begin_s: run.told for run in runs}
+    plain, _ = read(tmp_path / "a.tlog", rows, as_tlog)
+    late, _ = read(tmp_path / "b.tlog", rows, as_tlog, before_fix=40)
+    ways = [sum(float(np.hypot(*np.diff(run.seen[:, :2], axis=0).T).sum()) for run in runs) for runs in (plain, late)]
+    assert ways[1] == pytest.approx(ways[0], rel=1e-3)
+
+
+def test_another_component_of_the_boat_does_not_move_it(tmp_path):
+    rows = drive()
+    plain, _ = read(tmp_path / "a.tlog", rows, as_tlog)
+    mixed, said = read(tmp_path / "b.tlog", rows, as_tlog, component=191)
+    assert not said
+    assert np.allclose(plain[0].seen, mixed[0].seen)
+
+
+@pytest.mark.parametrize("first_has_fix", [True, False])
+def test_speeds_are_those_of_a_receiver_with_a_fix(first_has_fix, tmp_path):
+    rows, path = drive(), tmp_path / "a.bin"
+    forms = {**FORMATS, "GPS": (132, "QBBf", "TimeUS,I,Status,Spd")}
+    with path.open("wb") as file:
+        for name, (number, letters, columns) in forms.items():
+            size = 3 + {"FMT": 86, "POS": 16, "GPS": 14}.get(name, 12)
+            texts = name.encode(), letters.encode(), columns.encode()
+            file.write(b"\xa3\x95\x80" + struct.pack("<BB4s16s64s", number, size, *texts))
+        for time_s, x, y, heading, speed, told_speed, told_heading in rows:
+            stamp, place = round(1e6 * (time_s + 100.0)), [round(1e7 * value) for value in degrees_of(x, y)]
+            file.write(b"\xa3\x95" + bytes([130]) + struct.pack("<Qii", stamp, *place))
+            for k, value in ((131, heading % 360.0), (133, told_speed), (134, told_heading % 360.0)):
+                file.write(b"\xa3\x95" + bytes([k]) + struct.pack("<Qf", stamp, value))
+            for receiver in (0, 1):
+                fixed = (receiver == 0) == first_has_fix
+                values = (receiver, 4 if fixed else 1, speed if fixed else 0.0)
+                file.write(b"\xa3\x95" + bytes([132]) + struct.pack("<QBBf", stamp, *values))
+    runs = read_logs([path])
+    assert max(run.seen[:, 3].max() for run in runs) == pytest.approx(rows[:, 4].max(), abs=0.05)
+
+
+def test_a_share_of_top_speed_is_of_the_parameter_that_held_then(tmp_path):
+    runs, _ = read(tmp_path / "a.tlog", drive(), as_tlog, top=lambda t: 2.0 if t < 50.0 else 4.0)
+    assert max(run.told[:, 0].max() for run in runs) == pytest.approx(2.0, abs=1e-3)
+
+
+def test_where_the_first_parameter_is_zero_the_cruise_speed_counts(tmp_path):
+    rows, path = drive(), tmp_path / "a.tlog"
+    as_tlog(path, rows)
+    cruise = mavlink.MAVLink_param_value_message(b"CRUISE_SPEED", 3.0, 9, 1, 0).pack(mavlink.MAVLink(None, 1, 1))
+    none = mavlink.MAVLink_param_value_message(b"WP_SPEED", 0.0, 9, 1, 0).pack(mavlink.MAVLink(None, 1, 1))
+    head = struct.pack(">Q", round(1e6 * 1.7e9))
+    body = path.read_bytes()
+    first = 8 + len(none)
+    assert body[8 : 8 + 10] == none[:10].replace(none[4:5], body[12:13], 1)  # the parameter is what comes first
+    path.write_bytes(head + bytes(none) + head + bytes(cruise) + body[first:])
+    runs = read_logs([path])
+    assert max(run.told[:, 0].max() for run in runs) == pytest.approx(2.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("every", [1, 5, 9])
+def test_commands_keep_their_own_times_whatever_the_rate_of_positions(every, tmp_path):
+    rows = drive()
+    runs, _ = read(tmp_path / "a.tlog", rows, as_tlog, every=every)
+    held = {run.begin_s % 1.7e9: run.told for run in runs}
 
     def told_at(row):
         found = [told[k] for s, told in held.items() if 0 <= (k := round((row[0] - s) / 0.1)) < len(told)]
@@ -46,19 +134,20 @@ def test_rows_too_seldom_to_tell_a_delay_are_refused(tmp_path):
     with pytest.raises(FitError, match=r"come every 0.5 s, from which no delay can be told; log them at least every"):
         read(tmp_path / "a.csv", drive()[::5], as_csv)
     with pytest.raises(FitError, match=r"positions come every 1.5 s"):
-        read(tmp_path / "a.csv", drive()[::15], as_csv)
+        read(tmp_path / "a.tlog", drive(), as_tlog, every=15)
 
 
 UNITS = {"knots": 1.94384, "km/h": 3.6, "mph": 2.23694, "cm/s": 20.0}
 
 
 @pytest.mark.parametrize("unit", sorted(UNITS))
-def test_speeds_in_another_unit_than_the_positions_are_refused(unit, tmp_path):
+@pytest.mark.parametrize("ending", ["csv", "alog"])
+def test_speeds_in_another_unit_than_the_positions_are_refused(unit, ending, tmp_path):
     rows = drive(legs=[(speed / 2.0, heading) for speed, heading in LEGS])
     rows[:, 4] *= UNITS[unit]
     words = "is no boat's|by its speeds the boat went" if unit == "cm/s" else f"they look like {unit}"
     with pytest.raises(FitError, match=words):
-        read(tmp_path / "a.csv", rows, as_csv)
+        read(tmp_path / f"a.{ending}", rows, WRITERS[ending])
 
 
 def broken(rows, case):
@@ -141,3 +230,8 @@ def test_files_as_other_programs_write_them_are_read(tmp_path):
     text = (tmp_path / "plain.csv").read_text()
     (tmp_path / "bom.csv").write_bytes(b"\xef\xbb\xbf" + text.replace("\n", "\r\n").encode() + b"\r\n,,,,,,\r\n\r\n")
     assert np.allclose(read_logs([tmp_path / "bom.csv"])[0].seen, plain[0].seen)
+    as_alog(tmp_path / "plain.alog", rows)
+    lines = (tmp_path / "plain.alog").read_bytes().split(b"\n")
+    lines.insert(9, b"0.1 NOTE somebody caf\xe9 \xff\xfe")
+    (tmp_path / "odd.alog").write_bytes(b"\n".join(lines))
+    assert np.allclose(read_logs([tmp_path / "odd.alog"])[0].seen, read_logs([tmp_path / "plain.alog"])[0].seen)

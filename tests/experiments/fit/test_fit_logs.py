@@ -1,18 +1,18 @@
-"""A CSV of steps and a black box become the runs that were driven; what cannot be fitted is refused in one line."""
+"""Logs of every kind become the same runs, and what cannot be fitted is refused in one line."""
 
 import numpy as np
 import pytest
-from fit_logs import as_csv, drive
-from logged_runs import write_log
-from steerclear.experiments.fit.reading import read_box, read_logs
-from steerclear.experiments.fit.runs import FitError, untold
+from fit_logs import WRITERS, as_bin, as_csv, as_tlog, drive
+from steerclear.experiments.fit.reading import read_logs
+from steerclear.experiments.fit.runs import FitError
 
 
-def test_a_csv_gives_the_runs_that_were_driven(tmp_path):
+@pytest.mark.parametrize("ending", sorted(WRITERS))
+def test_a_log_of_any_kind_gives_the_runs_that_were_driven(ending, tmp_path):
     rows = drive()
-    paths = [tmp_path / f"{k}.csv" for k in range(3)]
+    paths = [tmp_path / f"{k}.{ending}" for k in range(3)]
     for path in paths:
-        as_csv(path, rows)
+        WRITERS[ending](path, rows)
     runs = read_logs(paths)
     assert len(runs) == 3
     for run in runs:
@@ -25,17 +25,12 @@ def test_a_csv_gives_the_runs_that_were_driven(tmp_path):
         assert np.abs(run.told[k, 0] - driven[:, 5]).mean() < 0.06
 
 
-def test_of_a_black_box_with_several_boats_one_is_named_and_read(tmp_path):
-    log = tmp_path / "run.mcap"
-    header, ticks = write_log(log, 100)
-    with pytest.raises(FitError, match=r"tells of boats blue_1, blue_2; name one with --boat"):
-        read_logs([log])
-    with pytest.raises(FitError, match="nothing of boat red_1; it has blue_1, blue_2"):
-        read_logs([log], "red_1")
-    (run,) = read_box(log, untold, "blue_2")
-    assert run.seconds == pytest.approx(100 * header.config.dt_s, abs=0.2)
-    assert run.seen[40, :2] == pytest.approx(ticks[40].fleet.state[1, :2], abs=0.3)
-    assert run.told[40, 0] == pytest.approx(ticks[40].sent["blue_2"].speed_mps, abs=0.05)
+def test_of_a_log_with_several_boats_one_is_named(tmp_path):
+    as_tlog(tmp_path / "two.tlog", drive(20.0), systems=(1, 4))
+    with pytest.raises(FitError, match=r"tells of boats 1, 4; name one with --system-id"):
+        read_logs([tmp_path / "two.tlog"])
+    with pytest.raises(FitError, match="nothing of boat 9; it has 1, 4"):
+        read_logs([tmp_path / "two.tlog"], system_id=9)
 
 
 def still(path):
@@ -52,13 +47,24 @@ BAD = {
     ),
     "empty": ("a.csv", lambda p: p.write_text(""), "is empty"),
     "bytes": ("a.csv", lambda p: p.write_bytes(b"\xff\xfe\x00\x01"), "is no CSV"),
-    "another ending": ("a.txt", lambda p: p.write_text("x"), "is no log that can be read; give a .csv"),
+    "another ending": ("a.txt", lambda p: p.write_text("x"), "is no log that can be read; give .csv"),
     "knots": (
         "a.csv",
         lambda p: as_csv(p, drive() * np.array([1, 1, 1, 1, 40, 1, 1])),
         "a speed of .* m/s is no boat's; give speeds in m/s",
     ),
     "no motion": ("a.csv", still, "fewer than 3|too little motion"),
+    "MOOS without commands": (
+        "a.alog",
+        lambda p: p.write_text("".join(f"{k} NAV_X s 1\n{k} NAV_Y s 1\n" for k in range(9))),
+        r"tells no headings \(NAV_HEADING\), no speeds .*give a log in which the boat was commanded",
+    ),
+    "ArduPilot without nav tuning": (
+        "a.bin",
+        lambda p: as_bin(p, drive(10.0), ("NTUN",)),
+        r"tells no headings commanded \(NTUN.DesYaw\)",
+    ),
+    "no MAVLink": ("a.tlog", lambda p: p.write_bytes(b"nothing of the kind" * 50), "tells no positions|cannot be read"),
     "no log there": ("b.csv", lambda p: None, "there is no log"),
 }
 

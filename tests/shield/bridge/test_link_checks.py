@@ -5,16 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bridge_fakes import fleet_of, fleet_text
 from steerclear.shield.bridge.autopilot_parameters import ASKED, FENCE_ASKED
 from steerclear.shield.bridge.clock import ManualClock
-from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.bridge.link_checks import (
     Watched,
     check_autopilot,
     check_clock,
     check_commanders,
-    check_fence,
     check_latency,
     check_rates,
     check_spread,
@@ -230,27 +227,3 @@ def test_every_parameter_that_is_looked_at_is_asked_for():
     assert {"FS_ACTION", "BATT_FS_LOW_ACT", "BATT_FS_CRT_ACT"} <= {*ASKED}
     assert "FENCE_ACTION" in FENCE_ASKED
     assert {"SYSID_MYGCS", "SYSID_ENFORCE", "ARMING_CHECK", "GUID_TIMEOUT"} <= {*ASKED}
-
-
-@pytest.mark.parametrize(
-    ("parameters", "passed", "words"),
-    [
-        ({}, True, "is off"),
-        (
-            {"FENCE_ENABLE": 1.0, "FENCE_ACTION": 2.0, "FENCE_MARGIN": 2.0},
-            False,
-            "11.8 m or more outside the hard line",
-        ),
-        ({"FENCE_ENABLE": 1.0, "FENCE_ACTION": 0.0}, False, "only reports and stops nothing: set it to 2"),
-        ({"FENCE_ENABLE": 1.0, "FENCE_ACTION": 1.0}, False, "FENCE_ACTION is 1 (RTL)"),
-    ],
-)
-def test_a_fence_of_its_own_is_for_the_operator_to_accept(parameters, passed, words):
-    result = check_fence("blue_1", fleet_of(platform="heron"), parameters)
-    assert result.passed == passed
-    assert words in result.text
-
-
-def test_where_boats_may_flee_for_ever_no_fence_is_taken():
-    fleet = parse_fleet(fleet_text(platform="heron").replace("geofence: {", "geofence: {then: flee, "))
-    assert "then is flee" in check_fence("blue_1", fleet, {"FENCE_ENABLE": 1.0}).text

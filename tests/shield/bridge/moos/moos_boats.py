@@ -33,12 +33,13 @@ def free_ports(count):
         return [server.getsockname()[1] for server in servers]
 
 
-def fleet_text(blue=1, red=0, platform="heron", more=""):
+def fleet_text(blue=1, red=0, platform="heron", gate="helm", more=""):
     lines = [HEAD.rstrip()]
     game = blue == red
     for i, port in enumerate(free_ports(blue)):
         side = f"agent: agent_{i}" if game else "team: blue"
-        link = f'{{kind: moos, address: "moos://127.0.0.1:{port}"}}'
+        stop = ", nothing_stops_it: true" if gate == "pid" else ""
+        link = f'{{kind: moos, address: "moos://127.0.0.1:{port}", gate: {gate}{stop}}}'
         lines.append(f"  - {{name: blue_{i + 1}, {side}, platform: {platform}, link: {link}}}")
     for i in range(red):
         side = f"agent: agent_{blue + i}" if game else "team: red"

@@ -9,7 +9,8 @@ from dataclasses import replace
 from moos_boats import until
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.moos.client import MoosClient
-from steerclear.shield.bridge.moos.drivers import VARIABLES, HelmGate
+from steerclear.shield.bridge.moos.drivers import VARIABLES
+from steerclear.shield.bridge.moos.gates import HelmGate, PidGate
 from steerclear.shield.bridge.moos.wire import notify
 
 
@@ -34,7 +35,7 @@ class RealDb:
         arguments = ["MOOSDB", f"--moos_port={port}", f"--moos_community={community}", f"--moos_time_warp={warp:g}"]
         self._process = subprocess.Popen(arguments, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         self.frozen = Frozen(self._process.pid)
-        names = (*VARIABLES, *HelmGate.outputs)
+        names = (*VARIABLES, *HelmGate.outputs, *PidGate.outputs)
         self._client = MoosClient("uDrill", "127.0.0.1", port, MonotonicClock(warp), names, self._take)
         self._client.start()
         if not until(lambda: self._client.connected, 15.0):

@@ -6,9 +6,11 @@ import pytest
 from steerclear.shield.bridge.frame import FieldFrame
 from steerclear.shield.bridge.messages import BoatReading
 from steerclear.shield.bridge.moos.checks import mission_faults, parse_mission
-from steerclear.shield.bridge.moos.drivers import Drivers, HelmGate
+from steerclear.shield.bridge.moos.drivers import Drivers
+from steerclear.shield.bridge.moos.gates import HelmGate, PidGate
 from steerclear.shield.bridge.moos.wire import Message
-from steerclear.shield.platforms import get_platform
+from steerclear.shield.platforms import fresh_state, get_platform, step_boat
+from steerclear.shield.platforms import layout as L
 
 
 def said(key, text, source="pMarineViewer"):
@@ -94,10 +96,52 @@ def test_the_helms_gate_takes_both_raw_variables_or_stops_and_says_which_is_miss
     assert "RAW_DESIRED_HEADING has been silent" in late.fault
     gate.hear(number("RAW_DESIRED_HEADING", math.nan, "helm"), 11.3)
     assert gate.nominal(reading(11.3)).fault  # no number is as good as silence
-    assert gate.encode(math.radians(350.0), 1.0) == {
+    assert gate.encode(math.radians(350.0), 1.0, reading()) == {
         "DESIRED_HEADING": pytest.approx(20.0),
         "DESIRED_SPEED": 1.0,
     }
+
+
+def test_the_gate_after_the_pid_passes_what_the_shield_leaves_alone_bit_for_bit():
+    gate = PidGate(get_platform("surveyor"), 0.1)
+    assert "DESIRED_RUDDER_PRECBF" in gate.nominal(reading()).fault
+    for k, (rudder, thrust) in enumerate([(12.345678901, 63.21), (-40.0, 63.3), (0.1, 70.0)]):
+        now = 10.0 + 0.1 * k
+        gate.hear(number("DESIRED_RUDDER_PRECBF", rudder, "pid"), now)
+        gate.hear(number("DESIRED_THRUST_PRECBF", thrust, "pid"), now)
+        nominal = gate.nominal(reading(now))
+        posted = gate.encode(nominal.heading_rad, nominal.speed_mps, reading(now))
+        assert posted == {"DESIRED_RUDDER": rudder, "DESIRED_THRUST": thrust}
+    assert nominal.speed_mps == pytest.approx(2.25)
+
+
+@pytest.mark.parametrize(
+    ("platform", "told", "posted"),
+    [
+        ("heron", (0.0, -50.0), (0.0, 0.0)),  # it is not known to go astern, so nobody decided on that
+        ("heron", (250.0, 160.0), (100.0, 100.0)),
+        ("surveyor", (-101.0, -150.0), (-100.0, -100.0)),
+        ("large_usv", (0.0, 90.0), (0.0, 70.0)),
+    ],
+)
+def test_the_gate_after_the_pid_passes_nothing_that_the_platform_cannot_do(platform, told, posted):
+    gate = PidGate(get_platform(platform), 0.1)
+    for key, value in zip(gate.inputs, told, strict=True):
+        gate.hear(number(key, value, "pid"), 10.0)
+    nominal = gate.nominal(reading())
+    found = gate.encode(nominal.heading_rad, nominal.speed_mps, reading())
+    assert tuple(found.values()) == posted
+
+
+def test_the_gate_after_the_pid_steers_as_the_platforms_autopilot_where_the_shield_decides_otherwise():
+    platform = get_platform("surveyor")
+    gate, row = PidGate(platform, 0.1), fresh_state(0.0, 0.0, math.degrees(0.5), 1.0)
+    for _ in range(5):
+        posted = gate.encode(1.2, 2.0, reading())
+        row[L.HEADING], row[L.SPEED] = math.degrees(0.5), 1.0
+        step_boat(platform.pack(), row, 2.0, math.degrees(0.7), 0.1)
+        assert posted["DESIRED_RUDDER"] == pytest.approx(row[L.RUDDER], abs=1e-6)
+        assert posted["DESIRED_THRUST"] == pytest.approx(row[L.THRUST], abs=1e-6)
 
 
 MISSION = """
@@ -119,8 +163,8 @@ ProcessConfig = pMarinePIDV22
 """
 
 
-def faults(text, port=9001, warp=1.0):
-    return mission_faults(parse_mission(text), port, warp, get_platform("heron"), "RAW_")
+def faults(text, port=9001, warp=1.0, gate="helm"):
+    return mission_faults(parse_mission(text), port, warp, get_platform("heron"), gate, "RAW_")
 
 
 def test_a_mission_that_fits_has_no_faults():

@@ -196,7 +196,13 @@ def test_commands_of_moos_need_links_of_moos():
     [
         ("moos://127.0.0.1", "HOST:PORT"),
         ("{kind: moos, address: 'udpin:127.0.0.1:1'}", "moos://HOST:PORT"),
-        ("{kind: moos, address: 'moos://127.0.0.1:9000', gate: pid}", "give helm, the only gate"),
+        ("{kind: moos, address: 'moos://127.0.0.1:9000', gate: rudder}", "gate"),
+        ("{kind: moos, address: 'moos://127.0.0.1:9000', gate: pid}", "no PID stops it when the gate dies"),
+        (
+            "{kind: moos, address: 'moos://127.0.0.1:9000', gate: pid, thrust_timeout_s: 1.0, nothing_stops_it: true}",
+            "thrust_timeout_s",
+        ),
+        ("{kind: moos, address: 'moos://127.0.0.1:9000', nothing_stops_it: true}", "are for gate: pid"),
     ],
 )
 def test_a_link_that_is_none_is_refused_with_its_form(link, word):

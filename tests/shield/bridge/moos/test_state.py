@@ -7,7 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from steerclear.shield.bridge.fleet_settings import ContactLimit
 from steerclear.shield.bridge.frame import FieldFrame
-from steerclear.shield.bridge.moos.contacts import MoosContacts, Navigation, parse_report
+from steerclear.shield.bridge.moos.contacts import MoosContacts, parse_report
+from steerclear.shield.bridge.moos.nav import Navigation
 from steerclear.shield.bridge.moos.wire import Message
 from steerclear.shield.bridge.tracker import ContactFusion
 
@@ -90,6 +91,12 @@ def test_a_report_is_a_contact_with_the_age_of_its_time():
     assert contact.heading_rad == pytest.approx(math.pi / 2)
     heard.hear(REPORT.format(time=2000.0), "blue_1", -900.0, 101.0)  # a clock that is ahead gains nothing
     assert heard.read()[0].fixed_s == 101.0
+
+
+def test_without_x_and_y_latitude_and_longitude_are_taken():
+    heard = contacts()
+    heard.hear("NAME=red_1,LAT=42.0001,LON=-71,SPD=0,HDG=0,TIME=1", "blue_1", 0.0, 1.0)
+    assert heard.read()[0].position_m == pytest.approx((0.0, 11.1), abs=0.1)
 
 
 @pytest.mark.parametrize(
