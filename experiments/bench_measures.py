@@ -14,7 +14,7 @@ from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
 from steerclear.policies import make_batch
 from steerclear.shield import Commands, Decisions, Fleet, Shield, ShieldConfig, Surroundings
-from steerclear.shield.decide import begin, decide_all, take_up
+from steerclear.shield.decide import begin, decide_all, load_decision
 from steerclear.shield.filter.program import Program, Solver, solve
 from steerclear.shield.jit import Array, kernel
 from steerclear.shield.platforms import get_platform
@@ -193,7 +193,7 @@ def decide_times(games: Games, config: ShieldConfig, repeats: int) -> dict[str, 
 @kernel
 def _check(scene: Scene) -> int:
     """The nominal check alone; how many groups of boats do not pass it."""
-    take_up(0, scene)
+    load_decision(0, scene)
     return begin(scene)
 
 

@@ -85,12 +85,12 @@ class BatchedShield:
     @property
     def safety_margin_m(self) -> Array:
         """(B, n) margins of the last decisions, m."""
-        return self._deciders.scene.told[:, :, W.MARGIN_M]
+        return self._deciders.scene.reported[:, :, W.MARGIN_M]
 
     @property
     def cut_short(self) -> BoolArray:
         """(B,) which of the last decisions were ended by `ShieldConfig.work_budget`."""
-        return np.asarray((self._deciders.scene.told[:, :, W.CUT_SHORT] != 0.0).any(axis=1))
+        return np.asarray((self._deciders.scene.reported[:, :, W.CUT_SHORT] != 0.0).any(axis=1))
 
     @property
     def remembered(self) -> dict[str, Array]:

@@ -29,13 +29,13 @@ from .filter.last_line import keep_last_line
 from .filter.nominal import screen
 from .filter.program import Program, Solver
 from .filter.qp import ROUNDS, accept, among_mates, begin_program, end_program, linearise, solve
-from .filter.right_of_way import forget_pressing, note_pressing
+from .filter.right_of_way import forget_deadlock, note_deadlock
 from .jit import Array, BoolArray, copy_row, kernel, lean_kernel
 from .model import tuning_of
 from .platforms import layout as L
 from .platforms.usv import wrap_degrees
 from .shared import share, type_of
-from .tracks import fill_memory, queue_commands, run_on, run_on_commands, steps_of_delay, turn_round
+from .tracks import astern_as_turned_ahead, extrapolate, fill_memory, queue_commands, roll_out_pending, steps_of_delay
 from .workspace import Boats, Scene, Static, all_spent, new_scene, part_of, unchanged
 
 ROUNDING_S = 1e-9
@@ -46,14 +46,14 @@ LEAST_TURN_DEG = 1e-3
 
 
 @lean_kernel
-def _note_fears(given: Array, scene: Scene) -> None:
+def _note_adversary_horizons(given: Array, scene: Scene) -> None:
     """Note how long each boat counts as adversarial: what is given, or where that is NaN the settings."""
     tuning = scene.tuning
     for i in range(given.shape[0]):
         time_s = tuning.intruder_horizon_s if given[i, W.VISITING] != 0.0 else tuning.adversary_horizon_s
         if not math.isnan(given[i, W.HORIZON_S]):
             time_s = given[i, W.HORIZON_S]
-        scene.fear_s[i] = time_s if tuning.adversary_horizon_s > 0.0 else 0.0
+        scene.adversary_horizon_s[i] = time_s if tuning.adversary_horizon_s > 0.0 else 0.0
 
 
 @lean_kernel
@@ -69,16 +69,16 @@ def _one_of_one_team(scene: Scene) -> int:
 
 
 @lean_kernel
-def _told_fear(i: int, mate: int, scene: Scene) -> float:
+def _reported_adversary_horizon(i: int, mate: int, scene: Scene) -> float:
     """How long boat i counts as adversarial, s: 0 where its way is predicted, NaN of who is nobody's opponent."""
     team = scene.boats.team
     if scene.ours[i] or (mate >= 0 and team[i] == team[mate]):
         return np.nan
-    return 0.0 if scene.known[i] else scene.fear_s[i]
+    return 0.0 if scene.known[i] else scene.adversary_horizon_s[i]
 
 
 @kernel
-def take_up(b: int, scene: Scene) -> None:
+def load_decision(b: int, scene: Scene) -> None:
     """Make decision b the scene's: boats at the moment its commands take effect, and what is remembered of them.
 
     Tracks are run on straight by their age and by the delay, own boats through the delay by the model under the
@@ -89,11 +89,11 @@ def take_up(b: int, scene: Scene) -> None:
         ours[i] = given[i, W.OURS] != 0.0
         copy_row(state[i], given[i, : L.N_STATE])
     note_predicted(given, scene)
-    _note_fears(given, scene)
-    turn_round(state, ours)
+    _note_adversary_horizons(given, scene)
+    astern_as_turned_ahead(state, ours)
     fill_memory(state, scene.boats.params)
-    run_on(state, given[:, W.AGE_S])
-    run_on_commands(state, ours, scene.boats.params, scene.pending[b], tuning.dt_s)
+    extrapolate(state, given[:, W.AGE_S])
+    roll_out_pending(state, ours, scene.boats.params, scene.pending[b], tuning.dt_s)
     for i in range(ours.shape[0]):
         copy_row(scene.nominal[i], given[i, W.NOMINAL_SPEED : W.NOMINAL_TURN + 1])
         turned = state[i, L.HEADING] - given[i, L.HEADING]  # until the command takes effect
@@ -106,9 +106,9 @@ def take_up(b: int, scene: Scene) -> None:
 
 
 @kernel
-def hand_over(b: int, scene: Scene) -> None:
+def store_decision(b: int, scene: Scene) -> None:
     """Write what decision number b has come to, and keep what is remembered of it."""
-    given, state, command, told = scene.given[b], scene.state, scene.command, scene.told[b]
+    given, state, command, reported = scene.given[b], scene.state, scene.command, scene.reported[b]
     mate = _one_of_one_team(scene)
     for i in range(state.shape[0]):
         copy_row(scene.memories[b, i], scene.memory[i])
@@ -129,17 +129,17 @@ def hand_over(b: int, scene: Scene) -> None:
         if reason == W.BACKUP and scene.solver[i] == W.BY_LINE_SEARCH:
             reason = W.LEAST_CHANGE
         scene.changed[b, i], scene.reasons[b, i] = changed, reason
-        told[i, W.SLACK_M], told[i, W.ACTIVE] = scene.slack_m[i], bound
-        told[i, W.CUT_SHORT] = 1.0 if scene.ours[i] and scene.cut_short[0] else 0.0
-        told[i, W.FEARED_S] = _told_fear(i, mate, scene)
-        told[i, W.SOLVER] = scene.solver[i] if reason == W.LEAST_CHANGE else 0
-        told[i, W.MARGIN_M] = np.inf if reason == W.NOT_COVERED else reported_margin(i, scene)
+        reported[i, W.SLACK_M], reported[i, W.ACTIVE] = scene.slack_m[i], bound
+        reported[i, W.CUT_SHORT] = 1.0 if scene.ours[i] and scene.cut_short[0] else 0.0
+        reported[i, W.ADVERSARY_HORIZON_S] = _reported_adversary_horizon(i, mate, scene)
+        reported[i, W.SOLVER] = scene.solver[i] if reason == W.LEAST_CHANGE else 0
+        reported[i, W.MARGIN_M] = np.inf if reason == W.NOT_COVERED else reported_margin(i, scene)
     if scene.pending.shape[1] > 0:
         queue_commands(scene.pending[b], state, command)
 
 
 @lean_kernel
-def _note_backing_up(i: int, scene: Scene) -> None:
+def _note_backup_hold(i: int, scene: Scene) -> None:
     """Note whether boat i is on its backup, and for how long it stays so at least.
 
     On the bound of what it must keep a boat would else take up the nominal command and its backup in turn, from step to
@@ -167,7 +167,7 @@ def commit(scene: Scene) -> None:
         memory, manoeuvre = scene.memory[i], scene.manoeuvre[i]
         if not scene.ours[i]:
             memory[W.HAS_BACKUP], memory[W.BACKING_UP] = 0.0, 0.0
-            forget_pressing(i, scene)
+            forget_deadlock(i, scene)
             continue
         memory[W.HAS_BACKUP], memory[W.BACKUP_SIDE], memory[W.BACKUP_SPEED] = 1.0, manoeuvre[0], manoeuvre[2]
         memory[W.BACKUP_HEADING] = np.nan
@@ -175,24 +175,24 @@ def commit(scene: Scene) -> None:
             end_deg = scene.next_state[i, L.HEADING] + math.copysign(manoeuvre[1], manoeuvre[0])
             memory[W.BACKUP_HEADING] = wrap_degrees(end_deg)
         memory[W.BACKUP_MARGIN] = scene.clear[i, MARGIN]
-        memory[W.STATIC_MARGIN] = scene.static_clear[i, MARGIN] if scene.kept[i] >= OPPONENTS else 0.0
+        memory[W.STATIC_MARGIN] = scene.static_clear[i, MARGIN] if scene.satisfied[i] >= OPPONENTS else 0.0
         memory[W.JOINT_MARGIN] = scene.joint_m[i] if scene.outnumbered[i] else 0.0
         for j in range(scene.ours.shape[0]):
             apart = scene.boats.table_steps[i] > 0
             memory[W.N_MEMORY + j] = scene.threats_m[i, j] if apart else scene.threat_m[i]
-        _note_backing_up(i, scene)
-        note_pressing(i, scene)
+        _note_backup_hold(i, scene)
+        note_deadlock(i, scene)
 
 
 @lean_kernel
 def _note_causes(scene: Scene) -> None:
     """Note what each boat's nominal command is short of: of an opponent also where a teammate is nearer."""
     for i in range(scene.ours.shape[0]):
-        short = scene.ours[i] and scene.kept[i] < ALL
-        scene.cause[i] = scene.bound[i] if short else -1
-        threatened = scene.kept[i] == OBSTACLES and scene.fails[i] and scene.threat_by[i] >= 0
+        short = scene.ours[i] and scene.satisfied[i] < ALL
+        scene.violated[i] = scene.bound[i] if short else -1
+        threatened = scene.satisfied[i] == OBSTACLES and scene.violates_pursuers[i] and scene.threat_by[i] >= 0
         if short and threatened:
-            scene.cause[i] = scene.threat_by[i]
+            scene.violated[i] = scene.threat_by[i]
 
 
 @lean_kernel
@@ -210,8 +210,8 @@ def _name_reasons(scene: Scene) -> None:
             scene.reason[i] = scene.checked_reason[i]
         if scene.reason[i] == W.HELD and unknown_at(i, scene) >= 0:
             scene.bound[i] = about(unknown_at(i, scene))
-        if scene.cause[i] <= STATIC and scene.kept[i] == ALL and not same:
-            scene.bound[i] = scene.cause[i]
+        if scene.violated[i] <= STATIC and scene.satisfied[i] == ALL and not same:
+            scene.bound[i] = scene.violated[i]
 
 
 @lean_kernel
@@ -278,9 +278,9 @@ def decide_scene(scene: Scene) -> None:
 def decide_all(scene: Scene) -> None:
     """All decisions, one after another."""
     for b in range(scene.given.shape[0]):
-        take_up(b, scene)
+        load_decision(b, scene)
         decide_scene(scene)
-        hand_over(b, scene)
+        store_decision(b, scene)
 
 
 def _decide_with(solver: Solver, scene: Scene) -> None:
@@ -353,9 +353,9 @@ class Deciders:
         self.beside(static)
         if self._solver is not None:
             for b in range(len(self.scene.given)):
-                take_up(b, self.scene)
+                load_decision(b, self.scene)
                 _decide_with(self._solver, self.scene)
-                hand_over(b, self.scene)
+                store_decision(b, self.scene)
             return
         if self._decide_all is None:
             made = getattr(decide_all, "compile", None)  # there is none where NUMBA_DISABLE_JIT is set

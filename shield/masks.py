@@ -14,14 +14,14 @@ import math
 
 import numpy as np
 
-from .backup.assign import choose_plan, hold, settled
+from .backup.assign import choose_manoeuvre, hold, settled
 from .backup.family import found_turn
-from .backup.rank import ALL, OPPONENTS, Rank, rank_path
-from .backup.rollout import lay_path
+from .backup.rank import ALL, OPPONENTS, Rank, score_path
+from .backup.rollout import roll_out
 from .barriers.clearance import FAR
 from .barriers.registered import unknown_at
 from .barriers.static import beyond_line
-from .decide import Deciders, take_up
+from .decide import Deciders, load_decision
 from .filter.nominal import predict, screen
 from .filter.right_of_way import apply_right_of_way
 from .jit import Array, BoolArray, copy_row, kernel, lean_kernel
@@ -82,15 +82,15 @@ def _has_backup(i: int, scene: Scene) -> bool:
     """Whether boat i satisfies everything on the backup it holds from its predicted state, or on one found now."""
     trial, held = scene.state.shape[0], scene.held
     togo_deg = found_turn(i, scene.next_state[i, L.HEADING], held)
-    lay_path(i, trial, held[i, 0], togo_deg, held[i, 2], 1, scene)
-    scene.kept[i], scene.worth_m[i] = rank_path(i, trial, SHORT_OF_ALL, scene)
-    if scene.kept[i] == ALL or scene.searched[i] > 0 or settled(i, 0, 1, scene):
-        return scene.kept[i] == ALL
+    roll_out(i, trial, held[i, 0], togo_deg, held[i, 2], 1, scene)
+    scene.satisfied[i], scene.score_m[i] = score_path(i, trial, SHORT_OF_ALL, scene)
+    if scene.satisfied[i] == ALL or scene.searched[i] > 0 or settled(i, 0, 1, scene):
+        return scene.satisfied[i] == ALL
     scene.searched[i], scene.spent[0] = 1, 0.0
-    choose_plan(i, scene.command[i, 0], 1, False, scene)
-    if scene.kept[i] == ALL:
+    choose_manoeuvre(i, scene.command[i, 0], 1, False, scene)
+    if scene.satisfied[i] == ALL:
         hold(i, held, scene)
-    return scene.kept[i] == ALL
+    return scene.satisfied[i] == ALL
 
 
 @lean_kernel
@@ -113,7 +113,7 @@ def _passing(i: int, b: int, candidates: Array, states: Array, passes: BoolArray
         scene.command[i, 0], scene.command[i, 1] = scene.state[i, L.SPEED], 0.0
         predict(i, scene.command, scene)
         togo_deg = found_turn(i, scene.next_state[i, L.HEADING], scene.held)
-        lay_path(i, i, scene.held[i, 0], togo_deg, scene.held[i, 2], 1, scene)
+        roll_out(i, i, scene.held[i, 0], togo_deg, scene.held[i, 2], 1, scene)
 
 
 @kernel
@@ -121,7 +121,7 @@ def _pass_all(scene: Scene, candidates: Array, passes: BoolArray) -> None:
     """Write which candidates (B, n, k, 2) pass, (B, n, k); all do of boats that are not decided for."""
     states = np.empty((candidates.shape[2], L.N_STATE))
     for b in range(candidates.shape[0]):
-        take_up(b, scene)
+        load_decision(b, scene)
         _begin(b, scene)
         for i in range(candidates.shape[1]):
             passes[b, i, :] = True

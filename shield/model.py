@@ -95,7 +95,7 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
     with_table = np.asarray((table >= 0).any(axis=1))
     params = np.array([kind.pack() for kind in kinds]).reshape(-1, L.N_PARAM)
     steady = np.minimum(params[:, L.MAX_THRUST], [limit.thrust for limit in limits])
-    plans, n_plans = _plans(certificate, kinds, with_table)
+    manoeuvres, n_manoeuvres = _manoeuvres_of(certificate, kinds, with_table)
     table_decay, decay = _decay(config.table_cbf_rate_per_s, config), _decay(config.cbf_rate_per_s, config)
     table_cap_m = _table_cap_m(config, tables)
     extra = [np.full(len(kinds), dt_s)] if config.moves > 1 else []
@@ -112,8 +112,8 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
             ready_thrust=np.where(with_table, FULL_THRUST * params[:, L.MAX_THRUST], ENOUGH_THRUST * steady),
             stride=stride,
             sample_s=stride * dt_s,
-            plans=plans,
-            n_plans=n_plans,
+            manoeuvres=manoeuvres,
+            n_manoeuvres=n_manoeuvres,
             decay=np.where(with_table, table_decay, decay),
             cap_m=np.where(with_table, table_cap_m, config.margin_cap_m),
             min_backup_hold_s=np.array([config.min_backup_hold_s if kind.kind == "rate" else 0.0 for kind in kinds]),
@@ -123,7 +123,7 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
             table_steps=np.where(with_table, steps, 0),
             joint_decay=decay,
             joint_samples=math.ceil(max(steps, round(JOINT_RUN_S / dt_s)) / stride),
-            feared=np.asarray((table >= 0).any(axis=0)),
+            has_table=np.asarray((table >= 0).any(axis=0)),
             **_horizons(config, kinds, limits, team, stride * dt_s),
         )
     )
@@ -211,13 +211,15 @@ def _table_or_none(own: Platform, other: Platform) -> ValueTable | None:
         return None
 
 
-def _plans(certificate: Certificate, kinds: tuple[Platform, ...], with_table: BoolArray) -> tuple[Array, IntArray]:
-    """`Boats.plans` and `Boats.n_plans`."""
+def _manoeuvres_of(
+    certificate: Certificate, kinds: tuple[Platform, ...], with_table: BoolArray
+) -> tuple[Array, IntArray]:
+    """`Boats.manoeuvres` and `Boats.n_manoeuvres`."""
     families = [certificate.manoeuvres(*boat) for boat in zip(kinds, with_table, strict=True)]
-    plans = np.full((len(kinds), max((len(family) for family in families), default=0), 3), np.nan)
-    for rows, family in zip(plans, families, strict=True):
+    manoeuvres = np.full((len(kinds), max((len(family) for family in families), default=0), 3), np.nan)
+    for rows, family in zip(manoeuvres, families, strict=True):
         rows[: len(family)] = family
-    return plans, np.array([len(family) for family in families], dtype=np.int64)
+    return manoeuvres, np.array([len(family) for family in families], dtype=np.int64)
 
 
 def _decay(cbf_rate_per_s: float, config: ShieldConfig) -> float:

@@ -14,7 +14,7 @@ import numpy as np
 from . import workspace as W
 from .autopilots import Autopilots, all_known, to_turn, unknown_memory
 from .backup.paths import SAG_M
-from .barriers.registered import KeptBarriers
+from .barriers.registered import RegisteredBarriers
 from .barriers.static import STATIC
 from .commands import Commands
 from .config import ShieldConfig
@@ -189,8 +189,8 @@ class Shield:
         self._barriers.renew()
         deciders.decide(self._keep_from(static, deciders.scene))
         self._barriers.tell()
-        sent, changed, reason, told = self._decided(deciders.scene)
-        sent, changed, reason, told = sent[place], changed[place], reason[place], told[place]
+        sent, changed, reason, reported = self._decided(deciders.scene)
+        sent, changed, reason, reported = sent[place], changed[place], reason[place], reported[place]
         commands = within.replaced(changed, sent, fleet.state[:, L.HEADING]) if changed.any() else within
         if cut is not None:
             reason[cut & (reason == W.PASSED)] = W.LIMITED
@@ -205,14 +205,14 @@ class Shield:
             filtered=commands,
             intervened=changed,
             reason=reason,
-            safety_margin_m=told[:, W.MARGIN_M],
-            slack_m=told[:, W.SLACK_M],
-            bound=self._bound[told[:, W.ACTIVE].astype(np.int64)],
+            safety_margin_m=reported[:, W.MARGIN_M],
+            slack_m=reported[:, W.SLACK_M],
+            bound=self._bound[reported[:, W.ACTIVE].astype(np.int64)],
             solve_time_s=time.perf_counter() - started,
             no_table=self._missing,
-            cut_short=told[:, W.CUT_SHORT] != 0.0,
-            adversary_horizon_s=told[:, W.FEARED_S],
-            solver=told[:, W.SOLVER].astype(np.int64),
+            cut_short=reported[:, W.CUT_SHORT] != 0.0,
+            adversary_horizon_s=reported[:, W.ADVERSARY_HORIZON_S],
+            solver=reported[:, W.SOLVER].astype(np.int64),
             barriers=self.config.barriers,
             area=around.field,
         )
@@ -345,13 +345,13 @@ class Shield:
     def _decided(self, scene: Scene) -> tuple[Array, BoolArray, IntArray, Array]:
         """What is sent (n, 2), whether it is changed, why, and what is told: of the team, or of each boat its own."""
         own = self._own_rows(len(scene.ours))
-        told = scene.told[own]
+        reported = scene.reported[own]
         if self.config.coordination == "per_boat":
             if scene.pending.shape[1] > 0:  # what each boat was told all others see
                 scene.pending[:, -1] = scene.pending[own[0], -1, own[1]]
             for first in np.flatnonzero((scene.given[:, :, W.OURS] != 0.0).any(axis=1))[:1]:
-                told[:, W.FEARED_S] = scene.told[first, :, W.FEARED_S]
-        return scene.sent[own], scene.changed[own], scene.reasons[own], told
+                reported[:, W.ADVERSARY_HORIZON_S] = scene.reported[first, :, W.ADVERSARY_HORIZON_S]
+        return scene.sent[own], scene.changed[own], scene.reasons[own], reported
 
     def _keep_from(self, static: Static, scene: Scene) -> Static:
         """Static constraints from now on; what was kept from others is no measure for these."""
@@ -404,9 +404,9 @@ def _boats_in(fleet: Fleet) -> tuple[Any, ...]:
     return fleet.platforms, fleet.names, fleet.team.tobytes()
 
 
-def barriers_of(config: ShieldConfig) -> KeptBarriers:
+def barriers_of(config: ShieldConfig) -> RegisteredBarriers:
     """The registered barriers that a shield of such settings keeps."""
-    return KeptBarriers(config.barriers, off_m(config) + SAG_M, steps_of_delay(config) * config.dt_s)
+    return RegisteredBarriers(config.barriers, off_m(config) + SAG_M, steps_of_delay(config) * config.dt_s)
 
 
 @lru_cache(maxsize=256)

@@ -39,7 +39,7 @@ def thrust_at(params: Array, speed_mps: float) -> float:
 
 
 @kernel
-def run_on(state: Array, seconds: Array) -> None:
+def extrapolate(state: Array, seconds: Array) -> None:
     """Move boats straight on for their number of seconds, in place."""
     for i in range(state.shape[0]):
         heading = math.radians(state[i, L.HEADING])
@@ -48,7 +48,7 @@ def run_on(state: Array, seconds: Array) -> None:
 
 
 @kernel
-def run_on_commands(state: Array, who: BoolArray, params: Array, pending: Array, dt_s: float) -> None:
+def roll_out_pending(state: Array, who: BoolArray, params: Array, pending: Array, dt_s: float) -> None:
     """Step boats of ``who`` through commands on their way, the others straight on; in place.
 
     Args:
@@ -85,7 +85,7 @@ def queue_commands(pending: Array, state: Array, commands: Array) -> None:
 
 
 @kernel
-def turn_round(state: Array, controlled: BoolArray) -> None:
+def astern_as_turned_ahead(state: Array, controlled: BoolArray) -> None:
     """Make boats not ours that go astern go ahead the same way, in place: others' courses are followed ahead."""
     for i in range(state.shape[0]):
         if not controlled[i] and state[i, L.SPEED] < 0.0:

@@ -31,15 +31,15 @@ its heading, age of its track, s, bound on its position error, m, `Fleet.visitin
 DRIVEN, N_GIVEN = L.N_STATE + 7, L.N_STATE + 11
 """And from there `Fleet.driven`."""
 
-MARGIN_M, SLACK_M, ACTIVE, CUT_SHORT, FEARED_S, SOLVER, N_TOLD = range(7)
-"""Columns of ``told``: safety margin and what is given up of it, m, the active constraint (see `Decisions.bound`),
+MARGIN_M, SLACK_M, ACTIVE, CUT_SHORT, ADVERSARY_HORIZON_S, SOLVER, N_REPORTED = range(7)
+"""Columns of ``reported``: safety margin and what is given up of it, m, the active constraint (see `Decisions.bound`),
 whether the search was ended by its limit, how long the boat counts as adversarial, s (NaN: it is no opponent), and what
 found a least change, see `BY_QP`."""
 
 HAS_BACKUP, BACKUP_SIDE, BACKUP_HEADING, BACKUP_SPEED, BACKUP_MARGIN, JOINT_MARGIN, STATIC_MARGIN = range(7)
 """Columns of ``memory``: whether the boat holds a backup; its side (1: clockwise), the heading it ends on, deg (NaN:
 no turn is left) and speed, m/s; margins verified: of all boats, of runs of several opponents, of static constraints."""
-BACKING_UP, HOLD_S, PRESSED_S, PRESSED_DEG, FREE_S, BLOCKED_BY, GIVES_WAY, N_MEMORY = range(7, 15)
+BACKING_UP, HOLD_S, DEADLOCK_S, DEADLOCK_DEG, FREE_S, BLOCKED_BY, GIVES_WAY, N_MEMORY = range(7, 15)
 """Whether it was carried out, and for how long it still is whatever is wanted, s; and see `right_of_way`: for how long
 a teammate has kept the boat from turning, s, its heading when that began, deg, time since it was last, s, the
 teammate (-1: none), and the side to which it gives way (0: it does not). Then the margin against each opponent, m."""
@@ -71,8 +71,8 @@ class Boats(NamedTuple):
     static_samples: IntArray  # (n,) samples until a half turn could be over
     stride: int  # model steps between path samples
     sample_s: float  # time between path samples, s
-    plans: Array  # (n, most, 3) backup manoeuvres of each, see `backup.family`; NaN beyond its own
-    n_plans: IntArray  # (n,) how many those are
+    manoeuvres: Array  # (n, most, 3) backup manoeuvres of each, see `backup.family`; NaN beyond its own
+    n_manoeuvres: IntArray  # (n,) how many those are
     decay: Array  # (n,) factor by which a margin may shrink in one step; 0: it may fall to 0 at once
     cap_m: Array  # (n,) margins above this may shrink freely, m
     min_backup_hold_s: Array  # (n,) least time for which a backup from opponents is carried on with, s
@@ -82,7 +82,7 @@ class Boats(NamedTuple):
     table_steps: IntArray  # (n,) steps ahead at which backups are compared by table, 0 for boats without one
     joint_decay: float  # factor by which the margin on runs of several opponents may shrink in one step
     joint_samples: int  # path samples over which several opponents are rolled out before they are looked up
-    feared: BoolArray  # (n,) whether some boat's table is about this boat
+    has_table: BoolArray  # (n,) whether some boat's table is about this boat
 
 
 class Registered(NamedTuple):
@@ -156,9 +156,9 @@ class Scene(NamedTuple):
     sent: Annotated[Array, "B", "n", 2]  # commands as those given; bit for bit those where nothing is changed
     changed: Annotated[BoolArray, "B", "n"]  # whether any bit is
     reasons: Annotated[IntArray, "B", "n"]
-    told: Annotated[Array, "B", "n", N_TOLD]
+    reported: Annotated[Array, "B", "n", N_REPORTED]
     memories: Annotated[Array, "B", "n", "memory"]
-    pending: Annotated[Array, "B", "delay", "n", 2]  # commands on their way, see `tracks.run_on_commands`
+    pending: Annotated[Array, "B", "delay", "n", 2]  # commands on their way, see `tracks.roll_out_pending`
     # of this decision
     state: Annotated[Array, "n", L.N_STATE]  # boats at the moment the commands take effect
     ours: Annotated[BoolArray, "n"]  # boats decided for now: of one group, while that is open
@@ -174,7 +174,7 @@ class Scene(NamedTuple):
     reason: Annotated[IntArray, "n"]
     solver: Annotated[IntArray, "n"]  # what found the command, between nominal one and backup: `BY_QP` and the like
     slack_m: Annotated[Array, "n"]
-    cause: Annotated[IntArray, "n"]  # what the nominal command is short of, as in ``bound``; -1: nothing
+    violated: Annotated[IntArray, "n"]  # what the nominal command is short of, as in ``bound``; -1: nothing
     group: Annotated[IntArray, "n"]  # see `filter.groups`
     moving: Annotated[BoolArray, "n"]  # boats whose commands are being changed
     movers: Annotated[IntArray, "n"]  # their list,
@@ -183,7 +183,7 @@ class Scene(NamedTuple):
     verified: Annotated[Array, "n", 5]  # what backups come to, see `filter.blend`
     # neighbours
     near: Annotated[BoolArray, "n", "n"]  # pairs that can matter
-    breach: Annotated[BoolArray, "n", "n"]  # pairs inside the separation
+    inside_separation: Annotated[BoolArray, "n", "n"]  # pairs inside the separation
     radius: Annotated[Array, "n", "n"]  # radius to keep
     course: Annotated[Array, "n", 4]  # position one step on at present velocity, and heading as a unit vector
     pursued: Annotated[BoolArray, "n"]  # whether an opponent that may pursue the boat is near
@@ -191,10 +191,10 @@ class Scene(NamedTuple):
     reach_samples: Annotated[IntArray, "n"]  # path samples over which opponents may be followed
     driven: Annotated[Array, "n", 4]
     known: Annotated[BoolArray, "n"]  # boats whose way is predicted, in ``path``, by what drives them
-    fear_s: Annotated[Array, "n"]  # time from now for which each opponent is adversarial
+    adversary_horizon_s: Annotated[Array, "n"]  # time from now for which each opponent is adversarial
     # required margins, m
     target: Annotated[Array, "n"]  # from boats that are not ours
-    mate_target_m: Annotated[Array, "n"]  # from those that are
+    teammate_target_m: Annotated[Array, "n"]  # from those that are
     threat_target_m: Annotated[Array, "n", "n"]  # from each pursuing opponent
     joint_target_m: Annotated[Array, "n"]  # on runs of several
     static_target_m: Annotated[Array, "n"]  # from static constraints
@@ -208,17 +208,17 @@ class Scene(NamedTuple):
     static_by: Annotated[IntArray, "n+1"]  # which of them it is from,
     static_known: Annotated[BoolArray, "n+1"]  # and whether these are of the path that is there
     bound: Annotated[IntArray, "n+1"]  # active constraint: a boat, -1 none, -2 and below static ones
-    kept: Annotated[IntArray, "n"]  # what it satisfies, see `backup.rank`,
-    worth_m: Annotated[Array, "n"]  # and the other entry of its score
-    short: Annotated[BoolArray, "n+1"]  # whether a required margin from boats whose way is known is not there
-    fails: Annotated[BoolArray, "n+1"]  # the same against pursuers
+    satisfied: Annotated[IntArray, "n"]  # what it satisfies, see `backup.rank`,
+    score_m: Annotated[Array, "n"]  # and the other entry of its score
+    violates_known: Annotated[BoolArray, "n+1"]  # whether a required margin from boats whose way is known is not there
+    violates_pursuers: Annotated[BoolArray, "n+1"]  # the same against pursuers
     threat_m: Annotated[Array, "n+1"]  # least margin against pursuers
     threat_by: Annotated[IntArray, "n+1"]  # the opponent it is from, -1: none
     threats_m: Annotated[Array, "n+1", "n"]  # margin against each, as far as they were looked at
     joint_m: Annotated[Array, "n+1"]  # least on runs of several opponents
     table_m: Annotated[Array, "n+1"]  # least that tables tell where they are looked up first
     pursuers_known: Annotated[BoolArray, "n+1"]  # whether these are all those of the path that is there
-    sealed: Annotated[BoolArray, "n+1"]  # whether a table alone made the manoeuvre fail
+    refused_by_table: Annotated[BoolArray, "n+1"]  # whether a table alone made the manoeuvre fail
     searched: Annotated[IntArray, "n"]  # changes of manoeuvres when a boat was last searched for, -1: never
     # scratch
     row: Annotated[Array, L.N_STATE]

@@ -23,7 +23,7 @@ from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.exceptions import BridgeError
 from steerclear.shield.platforms import fresh_state, step_boat
-from steerclear.shield.tracks import run_on_commands, thrust_at
+from steerclear.shield.tracks import roll_out_pending, thrust_at
 
 from ..terminal import SafeFormatter
 from .orders import boats_of
@@ -50,7 +50,7 @@ def warm_up(fleet: FleetFile) -> None:
         params, row = platform.pack(), fresh_state(0.0, 0.0, 0.0)
         step_boat(params, row, 1.0, 0.0, fleet.dt_s)
         thrust_at(params, 1.0)
-        run_on_commands(row[None].copy(), np.ones(1, np.bool_), params[None].copy(), np.zeros((1, 1, 2)), fleet.dt_s)
+        roll_out_pending(row[None].copy(), np.ones(1, np.bool_), params[None].copy(), np.zeros((1, 1, 2)), fleet.dt_s)
 
 
 @contextlib.contextmanager

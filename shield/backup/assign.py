@@ -11,8 +11,8 @@ from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..workspace import Scene, all_spent
 from .family import FAMILY, FOUND, IN_MEMORY, candidate, found_turn, remembered
-from .rank import ALL, OBSTACLES, OPPONENTS, WORST, Rank, all_keep, better, is_no_better, rank_path
-from .rollout import lay_path, lay_placed, place_manoeuvre
+from .rank import ALL, OBSTACLES, OPPONENTS, WORST, Rank, all_satisfy, better, is_no_better, score_path
+from .rollout import lay_placed, place_manoeuvre, roll_out
 
 SWEEPS = 2
 
@@ -29,18 +29,18 @@ def _take(i: int, slot: int, rank: Rank, scene: Scene) -> None:
     copy_row(scene.static_clear[i], scene.static_clear[slot])
     scene.static_known[i], scene.static_by[i] = scene.static_known[slot], scene.static_by[slot]
     scene.threat_m[i] = scene.threat_m[slot]
-    scene.fails[i] = scene.fails[slot]
+    scene.violates_pursuers[i] = scene.violates_pursuers[slot]
     copy_row(scene.threats_m[i], scene.threats_m[slot])
     scene.joint_m[i] = scene.joint_m[slot]
     scene.threat_by[i] = scene.threat_by[slot]
     scene.pursuers_known[i] = scene.pursuers_known[slot]
-    scene.sealed[i] = scene.sealed[slot]
+    scene.refused_by_table[i] = scene.refused_by_table[slot]
     scene.bound[i] = scene.bound[slot]
-    scene.kept[i], scene.worth_m[i] = rank
+    scene.satisfied[i], scene.score_m[i] = rank
 
 
 @lean_kernel
-def choose_plan(i: int, wanted_mps: float, done: int, best_of: bool, scene: Scene) -> None:
+def choose_manoeuvre(i: int, wanted_mps: float, done: int, best_of: bool, scene: Scene) -> None:
     """Give boat i a manoeuvre: the first that is safe, or with ``best_of`` the best.
 
     Of manoeuvres that are alike the first is taken, to starboard before to port, as the rules of the road ask. The best
@@ -55,44 +55,44 @@ def choose_plan(i: int, wanted_mps: float, done: int, best_of: bool, scene: Scen
     trial = state.shape[0]
     heading = scene.next_state[i, L.HEADING] if done == 1 else state[i, L.HEADING]
     best = WORST
-    cause = scene.cause[i]
-    compared = boats.table_steps[i] > 0 and done == 0 and cause >= 0 and not scene.ours[cause]
-    for p in range(boats.n_plans[i] + FAMILY):
+    violated = scene.violated[i]
+    compared = boats.table_steps[i] > 0 and done == 0 and violated >= 0 and not scene.ours[violated]
+    for p in range(boats.n_manoeuvres[i] + FAMILY):
         if p == IN_MEMORY and not remembered(i, done, heading, scene):
             continue
         if p == FOUND and (done == 1 or compared):
             continue
-        if best.kept == ALL and (not best_of or (p == FAMILY and not compared)):
+        if best.satisfied == ALL and (not best_of or (p == FAMILY and not compared)):
             return
         place_manoeuvre(i, trial, candidate(i, p, wanted_mps, heading, scene), done, scene)
         if done == 0 and is_no_better(i, trial, best, scene):
             scene.spent[0] += scene.cost[i]
         else:
             lay_placed(i, trial, done, scene)
-            rank = rank_path(i, trial, best, scene)
+            rank = score_path(i, trial, best, scene)
             if better(rank, best):
                 best = rank
                 _take(i, trial, rank, scene)
-        if (done == 1 and scene.sealed[trial]) or all_spent(scene):
+        if (done == 1 and scene.refused_by_table[trial]) or all_spent(scene):
             return
 
 
 @lean_kernel
 def refresh(i: int, scene: Scene) -> None:
     """Rate boat i's plan again against the others' present plans."""
-    scene.kept[i], scene.worth_m[i] = rank_path(i, i, WORST, scene)
+    scene.satisfied[i], scene.score_m[i] = score_path(i, i, WORST, scene)
 
 
 @lean_kernel
 def settled(i: int, sweep: int, done: int, scene: Scene) -> bool:
-    """Whether no other manoeuvre is to be searched for boat i in this sweep, see `assign_plans`."""
+    """Whether no other manoeuvre is to be searched for boat i in this sweep, see `assign_manoeuvres`."""
     memory = scene.memory
     was_short = (
         memory[i, W.HAS_BACKUP] > 0.0
         and memory[i, W.BACKING_UP] > 0.0
-        and (memory[i, W.BACKUP_MARGIN] < 0.0 or scene.kept[i] >= OPPONENTS)
+        and (memory[i, W.BACKUP_MARGIN] < 0.0 or scene.satisfied[i] >= OPPONENTS)
     )
-    if scene.kept[i] == ALL or (sweep > 0 and scene.kept[i] >= OBSTACLES):
+    if scene.satisfied[i] == ALL or (sweep > 0 and scene.satisfied[i] >= OBSTACLES):
         return True
     return done == 1 and was_short
 
@@ -106,11 +106,11 @@ def hold(i: int, held: Array, scene: Scene) -> None:
 
 
 @lean_kernel
-def _go_on(i: int, scene: Scene) -> None:
+def _continue_manoeuvre(i: int, scene: Scene) -> None:
     """Lay the path of boat i on the manoeuvre in ``scene.held`` from its predicted state."""
     held = scene.held
     togo = found_turn(i, scene.next_state[i, L.HEADING], held)
-    lay_path(i, i, held[i, 0], togo, held[i, 2], 1, scene)
+    roll_out(i, i, held[i, 0], togo, held[i, 2], 1, scene)
 
 
 @lean_kernel
@@ -126,26 +126,26 @@ def recheck(scene: Scene) -> None:
     """Rate all boats of ours when movers carry out ``scene.held`` from newly predicted states."""
     for i in range(scene.ours.shape[0]):
         if scene.moving[i]:
-            _go_on(i, scene)
+            _continue_manoeuvre(i, scene)
     rate(scene)
 
 
 @lean_kernel
-def lay_first(scene: Scene, done: int, who: BoolArray) -> None:
+def roll_out_first(scene: Scene, done: int, who: BoolArray) -> None:
     """Give each boat of ``who`` the manoeuvre to begin with: the one in memory, else the first of the family."""
     state = scene.state
     for i in range(state.shape[0]):
         if who[i] and scene.reason[i] == W.STOPPED:
-            lay_path(i, i, 1.0, 0.0, 0.0, done, scene)
+            roll_out(i, i, 1.0, 0.0, 0.0, done, scene)
         elif who[i]:
             heading = scene.next_state[i, L.HEADING] if done == 1 else state[i, L.HEADING]
             first = IN_MEMORY if remembered(i, done, heading, scene) else FAMILY
             side, togo, speed = candidate(i, first, scene.command[i, 0], heading, scene)
-            lay_path(i, i, side, togo, speed, done, scene)
+            roll_out(i, i, side, togo, speed, done, scene)
 
 
 @lean_kernel
-def assign_plans(scene: Scene, done: int, who: BoolArray) -> bool:
+def assign_manoeuvres(scene: Scene, done: int, who: BoolArray) -> bool:
     """Give the boats of ``who`` a manoeuvre from their predicted (done = 1) or present states (0).
 
     From predicted ones that is the first that is safe, from present ones, which are carried out, the best.
@@ -159,7 +159,7 @@ def assign_plans(scene: Scene, done: int, who: BoolArray) -> bool:
     """
     state, ours = scene.state, scene.ours
     n = state.shape[0]
-    lay_first(scene, done, who)
+    roll_out_first(scene, done, who)
     stale = True
     scene.searched[:] = -1
     changes = 0
@@ -176,7 +176,7 @@ def assign_plans(scene: Scene, done: int, who: BoolArray) -> bool:
             if scene.searched[i] == changes and not (done == 0 and sweep == 1):  # it would find the same again
                 continue
             side, togo, speed = scene.manoeuvre[i, 0], scene.manoeuvre[i, 1], scene.manoeuvre[i, 2]
-            choose_plan(i, scene.command[i, 0], done, best_of, scene)
+            choose_manoeuvre(i, scene.command[i, 0], done, best_of, scene)
             if scene.manoeuvre[i, 0] != side or scene.manoeuvre[i, 1] != togo or scene.manoeuvre[i, 2] != speed:
                 changes += 1
             scene.searched[i] = changes
@@ -187,4 +187,4 @@ def assign_plans(scene: Scene, done: int, who: BoolArray) -> bool:
     for i in range(n):
         if ours[i] and (stale or not who[i] or scene.reason[i] == W.STOPPED):
             refresh(i, scene)
-    return all_keep(ALL, scene)
+    return all_satisfy(ALL, scene)

@@ -66,7 +66,7 @@ class Certificate:
     Attributes:
         name: its name in settings.
         summary: what h means, one line.
-        plans: (m, 3) manoeuvres of boats whose opponents are run through.
+        rolled_out: (m, 3) manoeuvres of boats whose opponents are run through.
         looked_up: (m, 3) manoeuvres of boats whose opponents are looked up in value tables.
         slowing: (m, 3) what boats look at besides that steer without thrust; others lose their rudder with it.
         tables: which boats look opponents up in value tables: "none", "slow" ones, or "all".
@@ -74,7 +74,7 @@ class Certificate:
 
     name: str
     summary: str
-    plans: Array
+    rolled_out: Array
     looked_up: Array
     slowing: Array
     tables: str = "none"
@@ -85,8 +85,8 @@ class Certificate:
 
     def manoeuvres(self, platform: Platform, with_table: bool) -> Array:
         """(m, 3) manoeuvres that a boat looks at, in the order in which they are tried."""
-        plans = self.looked_up if with_table else self.plans
-        return np.vstack([plans, self.slowing]) if platform.kind == "rate" else plans
+        rolled_out = self.looked_up if with_table else self.rolled_out
+        return np.vstack([rolled_out, self.slowing]) if platform.kind == "rate" else rolled_out
 
     def uses_table(self, limits: Limits) -> bool:
         """Whether a boat looks opponents up where there is a table."""
@@ -117,7 +117,7 @@ def _slowing() -> Array:
 TURNING_CIRCLE = Certificate(
     "turning_circle",
     "distance kept on the best turning circle, either side, any exit; opponents may pursue with their granted share",
-    plans=_turning(TURNS_DEG),
+    rolled_out=_turning(TURNS_DEG),
     looked_up=_turning(LOOKED_UP_TURNS_DEG, GENTLE_SHARES),
     slowing=_slowing(),
 )
@@ -180,6 +180,6 @@ def candidate(i: int, p: int, wanted_mps: float, heading_deg: float, scene: Scen
         return memory[i, BACKUP_SIDE], kept_turn(i, heading_deg, scene), memory[i, BACKUP_SPEED]
     if p == FOUND:
         return held[i, 0], found_turn(i, heading_deg, held), held[i, 2]
-    row = boats.plans[i, p - FAMILY]
+    row = boats.manoeuvres[i, p - FAMILY]
     speed = wanted_mps if row[2] == COMMANDED else row[2] * boats.params[i, L.MAX_SPEED]
     return row[0], row[1], speed

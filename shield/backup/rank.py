@@ -15,10 +15,10 @@ NOTHING, BOATS, OBSTACLES, OPPONENTS, ALL = range(5)
 """What is kept, each with all before it: clear of teammates and of opponents that hold their course; of obstacles near
 in time; what must be kept from all boats, whatever they are granted; what must be kept from static constraints."""
 
-SPARE_WORTH = 1e-3
+SPARE_SCORE = 1e-3
 """Worth of a metre to spare from boats beside one that static constraints are short of."""
 
-LATER_WORTH_M = 1e-3
+LATER_SCORE_M = 1e-3
 """Worth, m, of a sample more before a path is deepest in an obstacle, or where a barrier gives no margin at all."""
 
 SAME_M = 1e-6
@@ -29,14 +29,14 @@ class Rank(NamedTuple):
     """What a manoeuvre is worth; more is better, entry by entry.
 
     Attributes:
-        kept: the last thing it keeps, `NOTHING` to `ALL`.
-        worth_m: decides between those that keep as much, m: of `NOTHING` and `OBSTACLES` the least margin from boats,
+        satisfied: the last thing it satisfies, `NOTHING` to `ALL`.
+        score_m: decides between those that keep as much, m: of `NOTHING` and `OBSTACLES` the least margin from boats,
             of `BOATS` that from obstacles, of `OPPONENTS` that from static constraints less what must be kept, and of
             `ALL` what is to spare from boats.
     """
 
-    kept: int
-    worth_m: float
+    satisfied: int
+    score_m: float
 
 
 WORST = Rank(NOTHING, -1e9)
@@ -46,27 +46,29 @@ WORST = Rank(NOTHING, -1e9)
 @lean_kernel
 def better(rank: Rank, best: Rank) -> bool:
     """Whether a rank is above another by more than rounding."""
-    return rank.kept > best.kept or (rank.kept == best.kept and rank.worth_m > best.worth_m + SAME_M)
+    return rank.satisfied > best.satisfied or (
+        rank.satisfied == best.satisfied and rank.score_m > best.score_m + SAME_M
+    )
 
 
 @lean_kernel
-def rank_of(i: int, scene: Scene) -> Rank:
+def score_of(i: int, scene: Scene) -> Rank:
     """Rank of the manoeuvre boat i has."""
-    return Rank(scene.kept[i], scene.worth_m[i])
+    return Rank(scene.satisfied[i], scene.score_m[i])
 
 
 @lean_kernel
 def level_to_beat(best: Rank) -> float:
     """Margin against pursuers, m, at which a manoeuvre short of what it must keep is no better than the best."""
-    if best.kept > OBSTACLES:
+    if best.satisfied > OBSTACLES:
         return FAR
-    return best.worth_m if best.kept == OBSTACLES else -FAR
+    return best.score_m if best.satisfied == OBSTACLES else -FAR
 
 
 @lean_kernel
 def least_to_beat(best: Rank) -> float:
     """Margin, m, below which a manoeuvre is no better than the best, whatever else it keeps."""
-    return best.worth_m + SAME_M if best.kept == ALL else -FAR
+    return best.score_m + SAME_M if best.satisfied == ALL else -FAR
 
 
 @lean_kernel
@@ -77,11 +79,11 @@ def is_no_better(i: int, slot: int, best: Rank, scene: Scene) -> bool:
 
 
 @lean_kernel
-def _ask_no_pursuers(slot: int, scene: Scene) -> None:
+def _skip_pursuers(slot: int, scene: Scene) -> None:
     """Margins against pursuers of a path of which they do not matter: none is better than that from the others."""
     margin = scene.clear[slot, MARGIN]
     scene.threat_m[slot], scene.threats_m[slot, :], scene.joint_m[slot] = margin, margin, FAR
-    scene.sealed[slot], scene.pursuers_known[slot] = False, False
+    scene.refused_by_table[slot], scene.pursuers_known[slot] = False, False
 
 
 @lean_kernel
@@ -94,11 +96,11 @@ def _rank_if_clear(i: int, slot: int, scene: Scene) -> Rank:
         )
     to_spare_m = scene.static_clear[slot, MARGIN] - scene.static_target_m[i]
     spare_m = min(scene.clear[slot, MARGIN], scene.tuning.margin_cap_m)
-    return Rank(ALL, spare_m) if to_spare_m >= 0.0 else Rank(OPPONENTS, to_spare_m + SPARE_WORTH * spare_m)
+    return Rank(ALL, spare_m) if to_spare_m >= 0.0 else Rank(OPPONENTS, to_spare_m + SPARE_SCORE * spare_m)
 
 
 @lean_kernel
-def rank_path(i: int, slot: int, best: Rank, scene: Scene) -> Rank:
+def score_path(i: int, slot: int, best: Rank, scene: Scene) -> Rank:
     """Rank of the path in ``slot`` for boat i; work is cut short once it cannot exceed ``best``.
 
     What is certain comes before what is feared: teammates and opponents that hold their course first, obstacles near
@@ -108,42 +110,42 @@ def rank_path(i: int, slot: int, best: Rank, scene: Scene) -> Rank:
     scene.spent[0] += scene.cost[i]
     clear = scene.clear[slot]
     least_m = least_to_beat(best)
-    worst_clearance(i, slot, scene, best.worth_m if best.kept == NOTHING else max(0.0, least_m))
+    worst_clearance(i, slot, scene, best.score_m if best.satisfied == NOTHING else max(0.0, least_m))
     if not clear[MARGIN] >= 0.0:
-        _ask_no_pursuers(slot, scene)
+        _skip_pursuers(slot, scene)
         return Rank(NOTHING, clear[MARGIN])
     touched = clear_of_near_obstacles(i, slot, scene, 0.0, scene.spare2)
     if not scene.spare2[MARGIN] >= 0.0:
-        rank = Rank(BOATS, scene.spare2[MARGIN] + LATER_WORTH_M * scene.spare2[SAMPLE])
+        rank = Rank(BOATS, scene.spare2[MARGIN] + LATER_SCORE_M * scene.spare2[SAMPLE])
         if better(rank, best):
             worst_pursuer(i, slot, -FAR, -FAR, scene)
         else:
-            _ask_no_pursuers(slot, scene)
-        scene.sealed[slot], scene.bound[slot] = False, touched
+            _skip_pursuers(slot, scene)
+        scene.refused_by_table[slot], scene.bound[slot] = False, touched
         return rank
-    sure_m, short = clear[MARGIN], scene.short[slot]
+    sure_m, short = clear[MARGIN], scene.violates_known[slot]
     if short and not better(Rank(OBSTACLES, sure_m), best):
-        _ask_no_pursuers(slot, scene)
+        _skip_pursuers(slot, scene)
         return Rank(OBSTACLES, sure_m)
-    if best.kept > OBSTACLES:  # what static constraints say is found sooner than what pursuers may do
+    if best.satisfied > OBSTACLES:  # what static constraints say is found sooner than what pursuers may do
         rank = _rank_if_clear(i, slot, scene)
         if not better(rank, best):
-            _ask_no_pursuers(slot, scene)
+            _skip_pursuers(slot, scene)
             return rank
     worst_pursuer(i, slot, level_to_beat(best), least_m, scene)
-    if short or scene.fails[slot]:
+    if short or scene.violates_pursuers[slot]:
         return Rank(OBSTACLES, min(sure_m, scene.threat_m[slot]) if short else scene.threat_m[slot])
     rank = _rank_if_clear(i, slot, scene)
-    if rank.kept < ALL:
+    if rank.satisfied < ALL:
         scene.bound[slot] = scene.static_by[slot]
     return rank
 
 
 @lean_kernel
-def all_keep(least: int, scene: Scene) -> bool:
+def all_satisfy(least: int, scene: Scene) -> bool:
     """Whether every boat of ours keeps at least that much."""
     ours = scene.ours
     keep = True
     for i in range(ours.shape[0]):
-        keep = keep and (not ours[i] or scene.kept[i] >= least)
+        keep = keep and (not ours[i] or scene.satisfied[i] >= least)
     return keep

@@ -16,7 +16,7 @@ the end of the pursuit."""
 
 
 @lean_kernel
-def pursuers_run(i: int, slot: int, scene: Scene) -> int:
+def pursuit_extent(i: int, slot: int, scene: Scene) -> int:
     """How far opponents near boat i are to be run through as pursuers, which takes a longer path."""
     boats = scene.boats
     if not scene.pursued[i] or boats.table_steps[i] == 0:
@@ -33,7 +33,7 @@ def pursuers_run(i: int, slot: int, scene: Scene) -> int:
 
 
 @lean_kernel
-def _lay_command(i: int, slot: int, scene: Scene) -> None:
+def _roll_out_command(i: int, slot: int, scene: Scene) -> None:
     """Write where boat i is during the step it is predicted for, as far as that is of several moves."""
     state, boats, tuning = scene.state, scene.boats, scene.tuning
     if tuning.moves == 1:
@@ -47,7 +47,7 @@ def _lay_command(i: int, slot: int, scene: Scene) -> None:
 
 
 @lean_kernel
-def lay_path(i: int, slot: int, side: float, togo_deg: float, speed_mps: float, done: int, scene: Scene) -> None:
+def roll_out(i: int, slot: int, side: float, togo_deg: float, speed_mps: float, done: int, scene: Scene) -> None:
     """Roll a manoeuvre of boat i out into ``slot``, from its predicted state (done = 1) or its present one (0)."""
     place_manoeuvre(i, slot, (side, togo_deg, speed_mps), done, scene)
     lay_placed(i, slot, done, scene)
@@ -66,7 +66,7 @@ def place_manoeuvre(i: int, slot: int, manoeuvre: tuple[float, float, float], do
 def lay_placed(i: int, slot: int, done: int, scene: Scene) -> None:
     """Roll out the manoeuvre that was placed in ``slot``."""
     boats, tuning, manoeuvre = scene.boats, scene.tuning, scene.manoeuvre[slot]
-    how = pursuers_run(i, slot, scene)
+    how = pursuit_extent(i, slot, scene)
     samples, chased = boats.samples[i], boats.pursuit_samples[i] + boats.chased_samples[i]
     if how != NO_PURSUERS:
         samples = chased + boats.thrust_samples[i]
@@ -74,7 +74,7 @@ def lay_placed(i: int, slot: int, done: int, scene: Scene) -> None:
     if scene.outnumbered[i]:
         earliest = max(earliest, boats.joint_samples)
     if done == 1:
-        _lay_command(i, slot, scene)
+        _roll_out_command(i, slot, scene)
     copy_row(scene.row, scene.next_state[i] if done == 1 else scene.state[i])
     span = Span(
         tuning.model_s,

@@ -30,7 +30,7 @@ def reported_margin(i: int, scene: Scene) -> float:
     state = scene.state
     least, in_breach = FAR, False
     for j in range(state.shape[0]):
-        if j != i and scene.near[i, j] and scene.breach[i, j]:
+        if j != i and scene.near[i, j] and scene.inside_separation[i, j]:
             in_breach = True
             gap = math.hypot(state[i, L.X] - state[j, L.X], state[i, L.Y] - state[j, L.Y])
             least = min(least, gap - scene.radius[i, j])
@@ -55,39 +55,39 @@ def clear_of_boat(i: int, j: int, path: Array, scene: Scene, floor_m: float, cap
 
 
 @lean_kernel
-def must_keep(i: int, j: int, scene: Scene) -> float:
+def required_margin_m(i: int, j: int, scene: Scene) -> float:
     """Margin boat i must keep from boat j, whatever else is feared of it, m."""
     ours = scene.ours
-    return scene.mate_target_m[i] if ours[j] else scene.target[i]
+    return scene.teammate_target_m[i] if ours[j] else scene.target[i]
 
 
 @lean_kernel
 def worst_clearance(i: int, slot: int, scene: Scene, floor_m: float) -> None:
     """Worst clearance of boat i on the path in ``slot`` from teammates' paths and opponents' straight courses.
 
-    ``scene.short[slot]`` says whether one of them is below what must be kept; then the one that is so by most binds,
-    of margins below 0 the least.
+    ``scene.violates_known[slot]`` says whether one of them is below its required margin. Then the constraint that is
+    violated by most is active; of margins below 0 the least.
     """
     state, tuning = scene.state, scene.tuning
     clear = scene.clear[slot]
     clear[MARGIN] = FAR
     scene.bound[slot] = -1
-    scene.short[slot] = False
+    scene.violates_known[slot] = False
     shortest_m = 0.0
     for j in range(state.shape[0]):
         if j == i or not scene.near[i, j]:
             continue
-        least_m = must_keep(i, j, scene)
+        least_m = required_margin_m(i, j, scene)
         enough_m = max(least_m + ROUNDING_M, min(clear[MARGIN], tuning.margin_cap_m))
         clear_of_boat(i, j, scene.path[slot], scene, floor_m, enough_m)
         lacks_m = scene.out[MARGIN] - least_m
         if lacks_m < shortest_m:
-            scene.short[slot], shortest_m = True, lacks_m
+            scene.violates_known[slot], shortest_m = True, lacks_m
             if clear[MARGIN] >= 0.0:
                 scene.bound[slot] = j
         if scene.out[MARGIN] < clear[MARGIN]:
             copy_row(clear, scene.out)
-            if not scene.short[slot] or clear[MARGIN] < 0.0:
+            if not scene.violates_known[slot] or clear[MARGIN] < 0.0:
                 scene.bound[slot] = j
             if clear[MARGIN] < floor_m:
                 return

@@ -37,7 +37,7 @@ def find_neighbours(scene: Scene) -> None:
         _note_course(i, scene)
         for j in range(i):
             _note_pair(i, j, scene)
-    foresee(scene)
+    predict_game_controlled(scene)
     find_outnumbered(scene)
 
 
@@ -77,7 +77,7 @@ def _note_pair(i: int, j: int, scene: Scene) -> None:
         scene.pursued[i] = scene.pursued[i] or may_pursue(j, scene)
         scene.pursued[j] = scene.pursued[j] or may_pursue(i, scene)
     least, now = radius - tuning.buffer_m, math.sqrt(square)
-    scene.breach[i, j], scene.breach[j, i] = now < least, now < least
+    scene.inside_separation[i, j], scene.inside_separation[j, i] = now < least, now < least
     kept = max(least, min(radius, now + REGAIN_M))
     scene.radius[i, j], scene.radius[j, i] = kept, kept
 
@@ -152,7 +152,7 @@ def _near_ours(j: int, scene: Scene) -> bool:
 
 
 @lean_kernel
-def foresee(scene: Scene) -> None:
+def predict_game_controlled(scene: Scene) -> None:
     """Write the ways of boats of ``scene.known`` into ``scene.path``: sample 0 is one step of the model from now.
 
     They are written as far as anybody looks at them: near boats of ours, as long as the longest of backup manoeuvres.

@@ -150,11 +150,11 @@ def _pursuit_of(i: int, j: int, slot: int, lasts: int, closely: int, to_table: b
     """
     boats = scene.boats
     samples = min(lasts, int(scene.ready[slot, READY_SAMPLE])) if to_table else lasts
-    fear_s = adversarial_for(i, j, scene.state[i, L.SPEED], scene)
+    horizon_s = adversarial_for(i, j, scene.state[i, L.SPEED], scene)
     own_mps = max(boats.fastest_mps[i], scene.state[i, L.SPEED])
     return Pursuit(
         samples,
-        samples if fear_s >= WHOLE_S else min(samples, math.ceil(fear_s / boats.sample_s)),
+        samples if horizon_s >= WHOLE_S else min(samples, math.ceil(horizon_s / boats.sample_s)),
         closely,
         (CHASE_LEAD_SHARE if lasts > closely else LEAD_SHARE) * lasts,
         boats.fade[i] ** (boats.pursuit_samples[i] / lasts),
@@ -321,7 +321,7 @@ def _clear_of_threat(i: int, j: int, slot: int, level_m: float, least_m: float, 
     if by_table:
         margin_m = worst_at_once(i, j, slot, scene)
         scene.table_m[slot] = min(scene.table_m[slot], margin_m)
-        scene.sealed[slot] = scene.sealed[slot] or margin_m < target_m
+        scene.refused_by_table[slot] = scene.refused_by_table[slot] or margin_m < target_m
     else:
         margin_m = clear_of_pursuer(i, j, slot, floor_m, scene)
     scene.threats_m[slot, j] = margin_m
@@ -348,7 +348,7 @@ def _falls_short(i: int, slot: int, scene: Scene) -> bool:
 @lean_kernel
 def _may_harm(i: int, j: int, scene: Scene) -> bool:
     """Whether boat j is an opponent that is looked at as a pursuer of boat i."""
-    team, near = scene.boats.team, j != i and scene.near[i, j] and not scene.breach[i, j]
+    team, near = scene.boats.team, j != i and scene.near[i, j] and not scene.inside_separation[i, j]
     return near and not scene.ours[j] and team[i] != team[j] and may_pursue(j, scene)
 
 
@@ -369,14 +369,15 @@ def worst_pursuer(i: int, slot: int, level_m: float, least_m: float, scene: Scen
 
     What is known in full of a path is not asked again: it hangs on no teammate's manoeuvre, nor on the targets.
 
-    Of one that is short of its target (``scene.fails``) and below the level, or below the least, nothing more is to be
-    known: the search stops. Who came there last is looked at first: of many manoeuvres those that fail cost little.
+    Where a path violates its required margin (``scene.violates_pursuers``) below the level, or below the least, the
+    search stops: no more need be known. The opponent that came there last is looked at first, so that most manoeuvres
+    that fail cost little.
 
-    ``scene.sealed[slot]`` says whether the boat is short of a target by what a table tells of where it is looked up
-    first, and by nothing worse. One step on (done = 1) that is one place for all manoeuvres: then none does better.
+    ``scene.refused_by_table[slot]``: the margin is violated by what a table tells of the first place where the boat is
+    looked up, and by nothing worse. One step on (done = 1) that place is the same for all manoeuvres: none does better.
     """
     if not scene.pursuers_known[slot]:
-        scene.pursuers_known[slot], scene.sealed[slot], scene.threat_by[slot] = True, False, -1
+        scene.pursuers_known[slot], scene.refused_by_table[slot], scene.threat_by[slot] = True, False, -1
         scene.threats_m[slot, :], scene.joint_m[slot] = FAR, FAR
         scene.table_m[slot], scene.threat_m[slot] = FAR, FAR
         first = scene.first_pursuer[i]
@@ -387,7 +388,7 @@ def worst_pursuer(i: int, slot: int, level_m: float, least_m: float, scene: Scen
             if not _clear_of_threat(i, j, slot, level_m, least_m, scene):
                 scene.first_pursuer[i], scene.pursuers_known[slot] = j, False
                 break
-        scene.sealed[slot] = scene.sealed[slot] and scene.threat_m[slot] >= scene.table_m[slot]
-    scene.fails[slot] = _falls_short(i, slot, scene)
+        scene.refused_by_table[slot] = scene.refused_by_table[slot] and scene.threat_m[slot] >= scene.table_m[slot]
+    scene.violates_pursuers[slot] = _falls_short(i, slot, scene)
     if scene.threat_m[slot] < scene.clear[slot, MARGIN]:
         scene.clear[slot, MARGIN], scene.bound[slot] = scene.threat_m[slot], scene.threat_by[slot]

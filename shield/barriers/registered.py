@@ -71,7 +71,7 @@ def write_slope(b: int, i: int, slot: int, scene: Scene, out: Array) -> None:
     out[NORMAL_X], out[NORMAL_Y] = nx, ny
 
 
-class KeptBarriers:
+class RegisteredBarriers:
     """The registered barriers that a shield keeps, renewed before every decision.
 
     Args:

@@ -217,9 +217,9 @@ def clear_of_constraints(
         if (barrier >= 0 and now_m <= LOST_M) or (o == total and now_m >= 0.0):
             continue
         if o >= obstacles and now_m < 0.0:
-            worth_m = _way_back(o, now_m, path, sampling, static)
-            if worth_m < back_m:
-                beyond, back_m = o, worth_m
+            score_m = _way_back(o, now_m, path, sampling, static)
+            if score_m < back_m:
+                beyond, back_m = o, score_m
             continue
         last = sampling.near if near_only else sampling.last
         if _clearance(o, now_m, last, here, path, sampling, static, out):

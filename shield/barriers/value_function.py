@@ -57,7 +57,7 @@ def run_opponents(steps: int, scene: Scene) -> None:
     scene.pursuers_known[:] = False
     scene.lookup[:, :, PLACE_X] = np.nan
     for j in range(state.shape[0]):
-        if ours[j] or scene.known[j] or not boats.feared[j]:
+        if ours[j] or scene.known[j] or not boats.has_table[j]:
             continue
         params = boats.params[j]
         full = turn_of_rudder(params, params[L.MAX_THRUST], min(params[L.MAX_RUDDER], 100.0), tuning.model_s)
@@ -117,7 +117,7 @@ def tabled(i: int, j: int, scene: Scene) -> bool:
     """Whether a table is for boat i and opponent j, and tells enough of them."""
     boats = scene.boats
     table = boats.table[i, j]
-    if table < 0 or scene.breach[i, j] or scene.known[j]:
+    if table < 0 or scene.inside_separation[i, j] or scene.known[j]:
         return False
     return scene.radius[i, j] + boats.table_margin_m + ROOM_M <= boats.tables.axes[table, CAP]
 
@@ -134,8 +134,10 @@ def beyond_table(i: int, j: int, slot: int, scene: Scene) -> bool:
     boats, path, ready, course = scene.boats, scene.path[slot], scene.ready[slot], scene.course[j]
     own_mps = max(boats.fastest_mps[i], scene.state[i, L.SPEED])
     other_mps = max(boats.params[j, L.MAX_SPEED], scene.state[j, L.SPEED])
-    fear_s = adversarial_for(i, j, ready[READY_SPEED], scene)
-    kept_m = max(full_from_m(boats.tables, boats.table[i, j], fear_s), scene.radius[i, j] + scene.tuning.margin_cap_m)
+    horizon_s = adversarial_for(i, j, ready[READY_SPEED], scene)
+    kept_m = max(
+        full_from_m(boats.tables, boats.table[i, j], horizon_s), scene.radius[i, j] + scene.tuning.margin_cap_m
+    )
     gap_m = math.hypot(path[0, 0] - course[0], path[0, 1] - course[1])
     return gap_m >= kept_m + ROOM_M + (own_mps + other_mps) * boats.sample_s * ready[READY_SAMPLE]
 
@@ -145,10 +147,10 @@ def margin_when_ready(i: int, j: int, slot: int, run: Array, scene: Scene) -> fl
     """Margin, m, of boat i where a run of opponent j ends that is to be looked up."""
     boats, path, ready = scene.boats, scene.path[slot], scene.ready[slot]
     table, k = boats.table[i, j], int(ready[READY_SAMPLE])
-    fear_s = adversarial_for(i, j, ready[READY_SPEED], scene)
+    horizon_s = adversarial_for(i, j, ready[READY_SPEED], scene)
     dx, dy, heading = run[RUN_X] - path[k, 0], run[RUN_Y] - path[k, 1], math.atan2(run[RUN_EAST], run[RUN_NORTH])
     own_heading, own_mps = ready[READY_HEADING], ready[READY_SPEED]
-    value = table_value(boats.tables, table, fear_s, dx, dy, own_heading, heading, own_mps, run[RUN_SPEED])
+    value = table_value(boats.tables, table, horizon_s, dx, dy, own_heading, heading, own_mps, run[RUN_SPEED])
     return _margin_of(i, j, value, scene)
 
 
@@ -169,13 +171,13 @@ def table_margin(i: int, j: int, own: Array, others: Array, enough_m: float, sce
     """
     boats = scene.boats
     table, kept_m = boats.table[i, j], scene.radius[i, j] + boats.table_margin_m
-    fear_s = adversarial_for(i, j, own[PLACE_SPEED], scene)
+    horizon_s = adversarial_for(i, j, own[PLACE_SPEED], scene)
     least = FAR
     for way in range(others.shape[0]):
         other = others[way]
         dx, dy = other[PLACE_X] - own[PLACE_X], other[PLACE_Y] - own[PLACE_Y]
         headings, speeds = (own[PLACE_HEADING], other[PLACE_HEADING]), (own[PLACE_SPEED], other[PLACE_SPEED])
-        value = table_value(boats.tables, table, fear_s, dx, dy, headings[0], headings[1], speeds[0], speeds[1])
+        value = table_value(boats.tables, table, horizon_s, dx, dy, headings[0], headings[1], speeds[0], speeds[1])
         least = min(least, value)
         if least <= enough_m + kept_m:
             break
@@ -212,7 +214,7 @@ UNDER_WAY = 1.0 / 3.0
 def adversarial_for(i: int, j: int, speed_mps: float, scene: Scene) -> float:
     """Time, s, for which opponent j may do its worst against boat i at a speed; 0: it holds its course."""
     boats = scene.boats
-    fear_s = scene.fear_s[j]
-    if fear_s <= 0.0:
+    horizon_s = scene.adversary_horizon_s[j]
+    if horizon_s <= 0.0:
         return 0.0
-    return fear_s + max(0.0, UNDER_WAY - speed_mps / boats.params[i, L.MAX_SPEED]) * boats.regain_s[i]
+    return horizon_s + max(0.0, UNDER_WAY - speed_mps / boats.params[i, L.MAX_SPEED]) * boats.regain_s[i]

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..jit import Array, BoolArray
 from ..platforms import layout as L
-from ..tracks import run_on_commands, steps_of_delay
+from ..tracks import roll_out_pending, steps_of_delay
 from .fleet_file import FleetFile
 from .messages import Action, BoatReading, Sent
 
@@ -104,7 +104,7 @@ class ModelErrorMonitor:
         told = np.array(list(self._told)[len(self._told) - steps - self._late : len(self._told) - self._late])
         known: BoolArray = np.asarray(np.isfinite(then[:, : L.SPEED + 1]).all(axis=1))
         known = np.asarray(known & np.isfinite(told).all(axis=(0, 2)))
-        run_on_commands(then, known, self._params, told, self._dt_s)
+        roll_out_pending(then, known, self._params, told, self._dt_s)
         missed = np.hypot(then[:, L.X] - now[:, L.X], then[:, L.Y] - now[:, L.Y])
         return np.where(known, missed, np.nan)
 

@@ -18,10 +18,10 @@ import math
 
 import numpy as np
 
-from ..backup.assign import assign_plans
+from ..backup.assign import assign_manoeuvres
 from ..backup.family import IN_MEMORY, candidate, remembered
-from ..backup.rank import ALL, BOATS, OBSTACLES, OPPONENTS, WORST, Rank, better, rank_of, rank_path
-from ..backup.rollout import lay_path
+from ..backup.rank import ALL, BOATS, OBSTACLES, OPPONENTS, WORST, Rank, better, score_of, score_path
+from ..backup.rollout import roll_out
 from ..barriers.boats import reported_margin
 from ..barriers.clearance import MARGIN
 from ..barriers.static import clear_of_near_obstacles
@@ -39,7 +39,7 @@ def pick_movers(scene: Scene) -> int:
     ours = scene.ours
     n = ours.shape[0]
     for i in range(n):
-        if ours[i] and scene.kept[i] < ALL:
+        if ours[i] and scene.satisfied[i] < ALL:
             scene.moving[i] = True
             j = scene.bound[i]
             if j >= 0 and ours[j]:
@@ -60,19 +60,19 @@ def list_movers(scene: Scene) -> int:
 
 
 @lean_kernel
-def _given_up(i: int, scene: Scene) -> float:
+def _slack_of(i: int, scene: Scene) -> float:
     """What boat i is short of its distance from boats and static constraints, m."""
     least = reported_margin(i, scene)
-    if scene.kept[i] >= OPPONENTS:
+    if scene.satisfied[i] >= OPPONENTS:
         least = min(least, scene.static_clear[i, MARGIN])
-    if scene.kept[i] == BOATS:  # of an obstacle near in time nothing else is noted
+    if scene.satisfied[i] == BOATS:  # of an obstacle near in time nothing else is noted
         clear_of_near_obstacles(i, i, scene, 0.0, scene.spare2)
         least = min(least, scene.spare2[MARGIN])
     return max(0.0, -least)
 
 
 @lean_kernel
-def set_off(i: int, scene: Scene) -> None:
+def command_backup(i: int, scene: Scene) -> None:
     """Make boat i's command and plan those of its backup: the first step of it, through the autopilot's inverse."""
     state, boats, tuning = scene.state, scene.boats, scene.tuning
     side, togo, speed = scene.manoeuvre[i, 0], scene.manoeuvre[i, 1], scene.manoeuvre[i, 2]
@@ -85,13 +85,13 @@ def set_off(i: int, scene: Scene) -> None:
 
 
 @lean_kernel
-def _could_keep(i: int, slot: int, scene: Scene) -> Rank:
+def _score_without_passed(i: int, slot: int, scene: Scene) -> Rank:
     """Rank of boat i's path in ``slot`` if teammates whose nominal commands passed were not there."""
     ours = scene.ours
     for j in range(ours.shape[0]):
         if ours[j] and not scene.moving[j]:
             scene.near[i, j] = False
-    rank = rank_path(i, slot, WORST, scene)
+    rank = score_path(i, slot, WORST, scene)
     for j in range(ours.shape[0]):
         if ours[j] and not scene.moving[j]:
             scene.near[i, j] = scene.near[j, i]
@@ -99,7 +99,7 @@ def _could_keep(i: int, slot: int, scene: Scene) -> Rank:
 
 
 @lean_kernel
-def _passed_are_in_the_way(count: int, scene: Scene) -> bool:
+def _passed_block(count: int, scene: Scene) -> bool:
     """Whether some mover would keep more if teammates whose nominal commands passed were not there.
 
     A boat that opponents or static constraints leave no way out is helped by nobody who gives up what was wanted.
@@ -108,16 +108,16 @@ def _passed_are_in_the_way(count: int, scene: Scene) -> bool:
     trial = state.shape[0]
     for m in range(count):
         i = scene.movers[m]
-        if scene.kept[i] == ALL:
+        if scene.satisfied[i] == ALL:
             continue
-        if better(_could_keep(i, i, scene), rank_of(i, scene)):
+        if better(_score_without_passed(i, i, scene), score_of(i, scene)):
             return True
         heading = state[i, L.HEADING]
         if not remembered(i, 0, heading, scene):
             continue
         side, togo, speed = candidate(i, IN_MEMORY, 0.0, heading, scene)
-        lay_path(i, trial, side, togo, speed, 0, scene)
-        if better(_could_keep(i, trial, scene), rank_of(i, scene)):
+        roll_out(i, trial, side, togo, speed, 0, scene)
+        if better(_score_without_passed(i, trial, scene), score_of(i, scene)):
             return True
     return False
 
@@ -138,7 +138,7 @@ def _join_short(scene: Scene) -> int:
     """Make movers of the boats of ours that passed and that the movers' backups come too near; returns as `_join`."""
     ours = scene.ours
     for i in range(ours.shape[0]):
-        if ours[i] and scene.kept[i] < OBSTACLES:
+        if ours[i] and scene.satisfied[i] < OBSTACLES:
             scene.moving[i] = True
     return list_movers(scene)
 
@@ -150,7 +150,7 @@ def _assign_backups(count: int, scene: Scene) -> bool:
     table_steps = 1
     for i in range(ours.shape[0]):
         scene.target[i] = 0.0
-        scene.mate_target_m[i] = 0.0
+        scene.teammate_target_m[i] = 0.0
     for m in range(count):
         i = scene.movers[m]
         scene.threat_target_m[i, :] = 0.0
@@ -158,7 +158,7 @@ def _assign_backups(count: int, scene: Scene) -> bool:
         scene.static_target_m[i] = 0.0
         table_steps = max(table_steps, boats.table_steps[i])
     run_opponents(table_steps, scene)
-    return assign_plans(scene, 0, scene.moving)
+    return assign_manoeuvres(scene, 0, scene.moving)
 
 
 @lean_kernel
@@ -173,13 +173,13 @@ def _find_backups(count: int, scene: Scene) -> None:
     for _ in range(ours.shape[0]):
         if _assign_backups(count, scene):
             break
-        movers = _join(scene) if _passed_are_in_the_way(count, scene) else _join_short(scene)
+        movers = _join(scene) if _passed_block(count, scene) else _join_short(scene)
         if movers == count:
             break
         count = movers
     run_opponents(1, scene)
     for m in range(count):
-        set_off(scene.movers[m], scene)
+        command_backup(scene.movers[m], scene)
     check(scene)
 
 
@@ -193,7 +193,7 @@ def back_up(scene: Scene) -> None:
     ours = scene.ours
     _find_backups(pick_movers(scene), scene)
     for i in range(ours.shape[0]):
-        keeps = scene.kept[i] >= OPPONENTS
+        keeps = scene.satisfied[i] >= OPPONENTS
         if ours[i] and scene.reason[i] != STOPPED and (scene.moving[i] or not keeps):
             scene.reason[i] = BACKUP if keeps else BEST_EFFORT
-            scene.slack_m[i] = _given_up(i, scene)
+            scene.slack_m[i] = _slack_of(i, scene)

@@ -14,9 +14,9 @@ from ..platforms import layout as L
 from ..platforms.actuator import command_for_turn
 from ..platforms.usv import wrap_degrees
 from ..workspace import BACKUP, BY_LINE_SEARCH, Scene, all_spent
-from .nominal import check, set_targets
+from .nominal import check, set_required_margins
 
-TURN, SPEED, HEADING, KEPT, WORTH = range(5)
+TURN, SPEED, HEADING, SATISFIED, SCORE = range(5)
 """Columns of ``scene.verified``."""
 
 LITTLE_M = 0.001
@@ -31,7 +31,7 @@ def note_verified(scene: Scene) -> None:
         if ours[i]:
             scene.verified[i, TURN] = wrap_degrees(scene.next_state[i, L.HEADING] - state[i, L.HEADING])
             scene.verified[i, SPEED], scene.verified[i, HEADING] = scene.command[i, 0], scene.command[i, 1]
-            scene.verified[i, KEPT], scene.verified[i, WORTH] = scene.kept[i], scene.worth_m[i]
+            scene.verified[i, SATISFIED], scene.verified[i, SCORE] = scene.satisfied[i], scene.score_m[i]
 
 
 @lean_kernel
@@ -40,7 +40,7 @@ def verify(static_rate: bool, scene: Scene) -> None:
 
     Without ``static_rate`` of static constraints only their distance is asked for.
     """
-    set_targets(scene)
+    set_required_margins(scene)
     if not static_rate:
         scene.static_target_m[:] = 0.0
     rate(scene)
@@ -48,20 +48,20 @@ def verify(static_rate: bool, scene: Scene) -> None:
 
 
 @lean_kernel
-def keeps_all(i: int, scene: Scene) -> bool:
+def satisfies_all(i: int, scene: Scene) -> bool:
     """Whether boat i's backup keeps everything."""
-    return int(scene.verified[i, KEPT]) == ALL
+    return int(scene.verified[i, SATISFIED]) == ALL
 
 
 @lean_kernel
 def before_opponent(i: int, scene: Scene) -> bool:
     """Whether an opponent is in the way of what boat i wants."""
-    cause = scene.cause[i]
+    cause = scene.violated[i]
     return cause >= 0 and not scene.ours[cause]
 
 
 @lean_kernel
-def go_back(i: int, scene: Scene) -> None:
+def restore_verified(i: int, scene: Scene) -> None:
     """Make boat i's command the verified one again."""
     scene.command[i, 0], scene.command[i, 1] = scene.verified[i, SPEED], scene.verified[i, HEADING]
 
@@ -73,9 +73,11 @@ def costs_at_most(most_m: float, scene: Scene) -> bool:
     within = True
     for i in range(ours.shape[0]):
         if ours[i]:
-            had = int(verified[i, KEPT])
-            least_m = verified[i, WORTH] - SAME_M - (most_m if had == ALL else 0.0)
-            within = within and (scene.kept[i] > had or (scene.kept[i] == had and scene.worth_m[i] >= least_m))
+            had = int(verified[i, SATISFIED])
+            least_m = verified[i, SCORE] - SAME_M - (most_m if had == ALL else 0.0)
+            within = within and (
+                scene.satisfied[i] > had or (scene.satisfied[i] == had and scene.score_m[i] >= least_m)
+            )
     return within
 
 
@@ -128,7 +130,7 @@ def _blend_one(i: int, scene: Scene) -> None:
         if kept == 1.0:
             break
     if kept == 0.0:
-        go_back(i, scene)
+        restore_verified(i, scene)
         scene.solver[i] = 0
     elif at != kept:
         _give_back(kept, i, scene)
@@ -160,5 +162,5 @@ def blend(scene: Scene) -> None:
     these and teammates: who uses up its room there has none left to make for others.
     """
     for i in range(scene.ours.shape[0]):
-        if _may_be_blended(i, scene) and keeps_all(i, scene) and not all_spent(scene):
+        if _may_be_blended(i, scene) and satisfies_all(i, scene) and not all_spent(scene):
             _blend_one(i, scene)

@@ -24,7 +24,7 @@ def _gather(first: int, group: int, scene: Scene) -> bool:
     while done < found:
         i = queue[done]
         done += 1
-        short = short or scene.kept[i] < ALL
+        short = short or scene.satisfied[i] < ALL
         for j in range(ours.shape[0]):
             if groups[j] == NOT_YET and scene.near[i, j]:
                 groups[j], queue[found] = group, j

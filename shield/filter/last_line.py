@@ -11,7 +11,7 @@ from __future__ import annotations
 from ..backup.assign import refresh
 from ..backup.family import IN_MEMORY, candidate, remembered
 from ..backup.paths import sail
-from ..backup.rollout import lay_path
+from ..backup.rollout import roll_out
 from ..barriers.clearance import FAR
 from ..barriers.shapes import goes_through, to_circle, to_wall
 from ..barriers.static import STATIC, beyond_line
@@ -19,7 +19,7 @@ from ..jit import Array, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..platforms.step import step_boat
 from ..workspace import BEST_EFFORT, STOPPED, Scene, Static
-from .backup_switch import set_off
+from .backup_switch import command_backup
 from .nominal import predict
 
 AT_REST_MPS = 0.05
@@ -88,7 +88,7 @@ def _stop(i: int, scene: Scene) -> None:
     """Tell boat i to stop on its course, and rate that."""
     scene.command[i, 0], scene.command[i, 1] = 0.0, 0.0
     predict(i, scene.command, scene)
-    lay_path(i, i, 1.0, 0.0, 0.0, 1, scene)
+    roll_out(i, i, 1.0, 0.0, 0.0, 1, scene)
     refresh(i, scene)
     scene.reason[i], scene.bound[i] = STOPPED, STATIC
 
@@ -102,11 +102,11 @@ def _go_on_as_before(i: int, scene: Scene) -> bool:
     side, togo, speed = candidate(i, IN_MEMORY, 0.0, state[i, L.HEADING], scene)
     if not _stays_clear(i, state[i], side, togo, speed, scene):
         return False
-    lay_path(i, i, side, togo, speed, 0, scene)
-    set_off(i, scene)
+    roll_out(i, i, side, togo, speed, 0, scene)
+    command_backup(i, scene)
     predict(i, scene.command, scene)
     side, togo, speed = candidate(i, IN_MEMORY, 0.0, scene.next_state[i, L.HEADING], scene)
-    lay_path(i, i, side, togo, speed, 1, scene)
+    roll_out(i, i, side, togo, speed, 1, scene)
     refresh(i, scene)
     scene.reason[i], scene.bound[i] = BEST_EFFORT, STATIC
     return True

@@ -6,7 +6,7 @@ Both predict one step by the full model, and rate what each boat then satisfies 
 from __future__ import annotations
 
 from .. import workspace as W
-from ..backup.assign import assign_plans, recheck
+from ..backup.assign import assign_manoeuvres, recheck
 from ..barriers.clearance import FAR
 from ..barriers.neighbours import find_neighbours
 from ..barriers.registered import unknown_at
@@ -39,7 +39,7 @@ def check(scene: Scene) -> None:
 
 
 @lean_kernel
-def _most_known(i: int, j: int, scene: Scene) -> float:
+def _largest_tabled_m(i: int, j: int, scene: Scene) -> float:
     """Largest margin, m, a table can tell of a pair: beyond it the margin is said to be infinite."""
     boats = scene.boats
     table = boats.table[i, j]
@@ -49,13 +49,13 @@ def _most_known(i: int, j: int, scene: Scene) -> float:
 
 
 @lean_kernel
-def _asked(decay: float, was_m: float, cap_m: float) -> float:
+def _required_m(decay: float, was_m: float, cap_m: float) -> float:
     """Margin, m, that is asked for of one that was ``was_m``, capped: the class-K rate of a step, but never below 0."""
     return decay * max(0.0, min(was_m, cap_m))
 
 
 @lean_kernel
-def set_targets(scene: Scene) -> None:
+def set_required_margins(scene: Scene) -> None:
     """Margins each boat must keep: the discrete-time class-K condition h(x+) >= decay * min(h(x), cap), at least 0.
 
     What is feared of opponents has its own, of each: beside a teammate, whose margin is small and sure, it would else
@@ -66,19 +66,21 @@ def set_targets(scene: Scene) -> None:
     ours, boats, tuning, memory = scene.ours, scene.boats, scene.tuning, scene.memory
     for i in range(ours.shape[0]):
         scene.target[i] = 0.0
-        scene.mate_target_m[i] = 0.0
+        scene.teammate_target_m[i] = 0.0
         scene.threat_target_m[i, :] = 0.0
         scene.joint_target_m[i] = 0.0
         scene.static_target_m[i] = 0.0
         if ours[i] and memory[i, W.HAS_BACKUP] > 0.0:
             decay, cap_m = boats.decay[i], boats.cap_m[i]
-            scene.target[i] = _asked(decay, memory[i, W.BACKUP_MARGIN], cap_m)
-            scene.mate_target_m[i] = _asked(decay, memory[i, W.BACKUP_MARGIN], min(tuning.teammate_margin_cap_m, cap_m))
-            scene.joint_target_m[i] = _asked(boats.joint_decay, memory[i, W.JOINT_MARGIN], cap_m)
-            scene.static_target_m[i] = _asked(tuning.static_decay, memory[i, W.STATIC_MARGIN], tuning.margin_cap_m)
+            scene.target[i] = _required_m(decay, memory[i, W.BACKUP_MARGIN], cap_m)
+            scene.teammate_target_m[i] = _required_m(
+                decay, memory[i, W.BACKUP_MARGIN], min(tuning.teammate_margin_cap_m, cap_m)
+            )
+            scene.joint_target_m[i] = _required_m(boats.joint_decay, memory[i, W.JOINT_MARGIN], cap_m)
+            scene.static_target_m[i] = _required_m(tuning.static_decay, memory[i, W.STATIC_MARGIN], tuning.margin_cap_m)
             for j in range(ours.shape[0]):
-                most_m = min(cap_m, _most_known(i, j, scene))
-                kept_m = _asked(decay, memory[i, W.N_MEMORY + j], most_m)
+                most_m = min(cap_m, _largest_tabled_m(i, j, scene))
+                kept_m = _required_m(decay, memory[i, W.N_MEMORY + j], most_m)
                 scene.threat_target_m[i, j] = most_m if memory[i, W.HOLD_S] > 0.0 else kept_m
 
 
@@ -92,7 +94,7 @@ def screen(scene: Scene) -> bool:
     state, ours = scene.state, scene.ours
     n, wanted = state.shape[0], scene.nominal
     find_neighbours(scene)
-    set_targets(scene)
+    set_required_margins(scene)
     for i in range(n):
         copy_row(scene.command[i], wanted[i])
         scene.slack_m[i] = 0.0
@@ -115,4 +117,4 @@ def screen(scene: Scene) -> bool:
     for i in range(n):
         copy_row(scene.checked[i], scene.command[i])
         scene.checked_reason[i] = scene.reason[i]
-    return assign_plans(scene, 1, ours)
+    return assign_manoeuvres(scene, 1, ours)

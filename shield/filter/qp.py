@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import math
 
-from ..barriers.boats import clear_of_boat, must_keep
+from ..barriers.boats import clear_of_boat, required_margin_m
 from ..barriers.clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE
 from ..barriers.registered import write_slope
 from ..barriers.static import about, clear_of_near_obstacles, clear_of_static
@@ -32,7 +32,7 @@ from ..platforms.actuator import command_for_turn, full_turn
 from ..platforms.step import step_boat
 from ..workspace import BY_QP, LEAST_CHANGE, ROW_COST, Scene, all_spent
 from .backup_switch import list_movers
-from .blend import LITTLE_M, WORTH, before_opponent, costs_at_most, go_back, keeps_all, note_verified
+from .blend import LITTLE_M, SCORE, before_opponent, costs_at_most, note_verified, restore_verified, satisfies_all
 from .nominal import check
 
 STATIC_AIM_M = 1e-3
@@ -180,9 +180,9 @@ def _rows_of_boats(r: int, m: int, count: int, scene: Scene) -> int:
         _add_effect(r, i, m, 1.0, scene)
         if other >= 0:
             _add_effect(r, j, other, -1.0, scene)
-        kept_m = max(must_keep(i, j, scene), scene.verified[i, WORTH])
-        if scene.ours[j] and keeps_all(j, scene):
-            kept_m = max(kept_m, scene.verified[j, WORTH])
+        kept_m = max(required_margin_m(i, j, scene), scene.verified[i, SCORE])
+        if scene.ours[j] and satisfies_all(j, scene):
+            kept_m = max(kept_m, scene.verified[j, SCORE])
         r = _close_row(r, i, j, kept_m - scene.out[MARGIN], count, scene)
     return r
 
@@ -253,7 +253,7 @@ def among_mates(scene: Scene) -> bool:
     """Whether teammates are in the way of any nominal command."""
     found = False
     for i in range(scene.ours.shape[0]):
-        found = found or (scene.ours[i] and scene.cause[i] >= 0 and scene.ours[scene.cause[i]])
+        found = found or (scene.ours[i] and scene.violated[i] >= 0 and scene.ours[scene.violated[i]])
     return found
 
 
@@ -266,10 +266,10 @@ def begin_program(scene: Scene) -> int:
     ours, moving = scene.ours, scene.moving
     moving[:] = False
     for i in range(ours.shape[0]):
-        j = scene.cause[i]
-        if ours[i] and j >= 0 and ours[j] and keeps_all(i, scene):
+        j = scene.violated[i]
+        if ours[i] and j >= 0 and ours[j] and satisfies_all(i, scene):
             moving[i] = True
-            moving[j] = moving[j] or (keeps_all(j, scene) and not before_opponent(j, scene))
+            moving[j] = moving[j] or (satisfies_all(j, scene) and not before_opponent(j, scene))
     count = list_movers(scene)
     for m in range(count):
         copy_row(scene.command[scene.movers[m]], scene.checked[scene.movers[m]])
@@ -315,7 +315,7 @@ def end_program(scene: Scene, safe: bool, count: int) -> None:
         if safe:
             scene.slack_m[i], scene.reason[i], scene.solver[i] = 0.0, LEAST_CHANGE, BY_QP
         else:
-            go_back(i, scene)
+            restore_verified(i, scene)
     if safe:
         note_verified(scene)
     elif count > 0:

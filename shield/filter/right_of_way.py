@@ -87,9 +87,9 @@ def _stands_on(i: int, j: int, state: Array) -> bool:
 def _who_blocks(i: int, turn_deg: float, speed_mps: float, scene: Scene) -> int:
     """Boat that still keeps boat i from turning as it wants; -1 for none."""
     state, memory = scene.state, scene.memory
-    if memory[i, W.HAS_BACKUP] == 0.0 or memory[i, W.PRESSED_S] <= 0.0 or memory[i, W.FREE_S] > FREED_S:
+    if memory[i, W.HAS_BACKUP] == 0.0 or memory[i, W.DEADLOCK_S] <= 0.0 or memory[i, W.FREE_S] > FREED_S:
         return -1
-    turned_deg = wrap_degrees(state[i, L.HEADING] - memory[i, W.PRESSED_DEG])
+    turned_deg = wrap_degrees(state[i, L.HEADING] - memory[i, W.DEADLOCK_DEG])
     if turned_deg * math.copysign(1.0, turn_deg) >= TURNED_DEG:
         return -1
     return _alongside(i, turn_deg, speed_mps, scene)
@@ -102,7 +102,7 @@ def _goes_on(i: int, turn_deg: float, speed_mps: float, scene: Scene) -> bool:
     j = int(memory[i, W.BLOCKED_BY])
     if j < 0 or not ours[j] or not scene.near[i, j] or memory[i, W.HAS_BACKUP] == 0.0:
         return False
-    if speed_mps <= STILL_MPS or memory[i, W.PRESSED_S] >= LONGEST_S:
+    if speed_mps <= STILL_MPS or memory[i, W.DEADLOCK_S] >= LONGEST_S:
         return False
     gap = math.hypot(state[j, L.X] - state[i, L.X], state[j, L.Y] - state[i, L.Y])
     return turn_deg * memory[i, W.GIVES_WAY] < 0.0 and gap < scene.radius[i, j] + CLEAR_M
@@ -114,18 +114,18 @@ def _press(i: int, turn_deg: float, speed_mps: float, scene: Scene) -> None:
     state, tuning, memory = scene.state, scene.tuning, scene.memory
     j = _who_blocks(i, turn_deg, speed_mps, scene)
     if j < 0:
-        memory[i, W.PRESSED_S] = 0.0
+        memory[i, W.DEADLOCK_S] = 0.0
     elif j != int(memory[i, W.BLOCKED_BY]):
-        memory[i, W.PRESSED_S] = tuning.dt_s
+        memory[i, W.DEADLOCK_S] = tuning.dt_s
     memory[i, W.BLOCKED_BY] = j
     if j < 0:
         return
     if memory[j, W.GIVES_WAY] != 0.0 and int(memory[j, W.BLOCKED_BY]) == i:
         return
-    memory[i, W.PRESSED_S] += tuning.dt_s
+    memory[i, W.DEADLOCK_S] += tuning.dt_s
     patience = PATIENCE if _stands_on(i, j, state) else 1.0
-    if memory[i, W.PRESSED_S] >= patience * tuning.deadlock_timeout_s:
-        memory[i, W.GIVES_WAY], memory[i, W.PRESSED_S] = -math.copysign(1.0, turn_deg), tuning.dt_s
+    if memory[i, W.DEADLOCK_S] >= patience * tuning.deadlock_timeout_s:
+        memory[i, W.GIVES_WAY], memory[i, W.DEADLOCK_S] = -math.copysign(1.0, turn_deg), tuning.dt_s
 
 
 @lean_kernel
@@ -134,26 +134,26 @@ def apply_right_of_way(i: int, scene: Scene) -> None:
     tuning, memory = scene.tuning, scene.memory
     speed_mps, turn_deg = scene.command[i, 0], wrap_degrees(scene.command[i, 1])
     if memory[i, W.GIVES_WAY] != 0.0 and not _goes_on(i, turn_deg, speed_mps, scene):
-        memory[i, W.GIVES_WAY], memory[i, W.PRESSED_S] = 0.0, 0.0
+        memory[i, W.GIVES_WAY], memory[i, W.DEADLOCK_S] = 0.0, 0.0
     if memory[i, W.GIVES_WAY] != 0.0:
-        memory[i, W.PRESSED_S] += tuning.dt_s
+        memory[i, W.DEADLOCK_S] += tuning.dt_s
     else:
         _press(i, turn_deg, speed_mps, scene)
-        if memory[i, W.GIVES_WAY] == 0.0 and memory[i, W.PRESSED_S] < tuning.deadlock_timeout_s:
+        if memory[i, W.GIVES_WAY] == 0.0 and memory[i, W.DEADLOCK_S] < tuning.deadlock_timeout_s:
             return
     scene.command[i, 1] = AWAY_DEG * memory[i, W.GIVES_WAY]
     scene.reason[i] = W.RIGHT_OF_WAY
 
 
 @lean_kernel
-def forget_pressing(i: int, scene: Scene) -> None:
+def forget_deadlock(i: int, scene: Scene) -> None:
     """Boat i is kept from turning by nobody, and gives way to nobody."""
     memory = scene.memory
-    memory[i, W.GIVES_WAY], memory[i, W.PRESSED_S], memory[i, W.BLOCKED_BY] = 0.0, 0.0, -1
+    memory[i, W.GIVES_WAY], memory[i, W.DEADLOCK_S], memory[i, W.BLOCKED_BY] = 0.0, 0.0, -1
 
 
 @lean_kernel
-def note_pressing(i: int, scene: Scene) -> None:
+def note_deadlock(i: int, scene: Scene) -> None:
     """Note since when, on what heading, boat i is kept from turning: its turn towards another was changed."""
     state, tuning, memory = scene.state, scene.tuning, scene.memory
     if scene.reason[i] == W.RIGHT_OF_WAY:
@@ -167,6 +167,6 @@ def note_pressing(i: int, scene: Scene) -> None:
     if _alongside(i, turn_deg, speed_mps, scene) != j:
         return
     memory[i, W.FREE_S] = 0.0
-    if memory[i, W.PRESSED_S] == 0.0:
-        memory[i, W.PRESSED_S] = tuning.dt_s
-        memory[i, W.PRESSED_DEG] = state[i, L.HEADING]
+    if memory[i, W.DEADLOCK_S] == 0.0:
+        memory[i, W.DEADLOCK_S] = tuning.dt_s
+        memory[i, W.DEADLOCK_DEG] = state[i, L.HEADING]

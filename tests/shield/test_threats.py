@@ -8,7 +8,7 @@ from shield_loops import packed, step_all
 from shield_scenes import fleet_of, relative
 from steerclear.shield import Shield, ShieldConfig
 from steerclear.shield.batch import BatchedShield
-from steerclear.shield.filter.nominal import set_targets
+from steerclear.shield.filter.nominal import set_required_margins
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.workspace import N_MEMORY
 
@@ -22,7 +22,7 @@ def remembered(rows, team, platform):
     shield = Shield(profile="ramming")
     decisions = shield.decide(fleet, relative(*[(row[3], 0.0) for row in rows]))
     scene = shield._deciders.scene
-    set_targets(scene)
+    set_required_margins(scene)
     return decisions, scene.memory[:, N_MEMORY:], scene
 
 

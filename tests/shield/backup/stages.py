@@ -23,7 +23,7 @@ def stages_of(config, state, platforms, team, surroundings=None):
     static = (surroundings or Surroundings()).pack(config, barriers_of(config).arrays)
     scene = workspace.new_scene(1, boats, static, tuning_of(config), 0)
     scene.state[:], scene.ours[:] = state, np.array(team) == 0
-    scene.fear_s[:] = config.effective_adversary_horizon_s
+    scene.adversary_horizon_s[:] = config.effective_adversary_horizon_s
     return Stages(scene)
 
 

@@ -7,8 +7,8 @@ from stages import screened, stages_of
 from steerclear.shield import ShieldConfig, Surroundings
 from steerclear.shield.backup.family import FAMILY, candidate
 from steerclear.shield.backup.paths import READY_SAMPLE
-from steerclear.shield.backup.rank import ALL, OPPONENTS, WORST, Rank, better, is_no_better, rank_path
-from steerclear.shield.backup.rollout import lay_path, lay_placed, place_manoeuvre
+from steerclear.shield.backup.rank import ALL, OPPONENTS, WORST, Rank, better, is_no_better, score_path
+from steerclear.shield.backup.rollout import lay_placed, place_manoeuvre, roll_out
 from steerclear.shield.barriers import pursuit
 from steerclear.shield.barriers.clearance import FAR
 from steerclear.shield.barriers.neighbours import find_neighbours
@@ -38,14 +38,14 @@ def ranked(at, number, best):
     if is_no_better(0, trial, best, at.scene):
         return None
     lay_placed(0, trial, 0, at.scene)
-    return Rank(*rank_path(0, trial, best, at.scene))
+    return Rank(*score_path(0, trial, best, at.scene))
 
 
 @pytest.mark.parametrize(("platform", "side_m"), [("heron", 40.0), ("surveyor", 70.0)])
 def test_only_what_is_no_better_is_cut_short(platform, side_m):
     spared, taken = 0, 0
     for at in scenes(platform, 25, side_m):
-        numbers = range(FAMILY, FAMILY + int(at.boats.n_plans[0]))
+        numbers = range(FAMILY, FAMILY + int(at.boats.n_manoeuvres[0]))
         full = [ranked(at, number, WORST) for number in numbers]
         for best in {*full[::4], Rank(ALL, 0.5), Rank(OPPONENTS, -1.0)}:
             for number, whole in zip(numbers, full, strict=True):
@@ -73,7 +73,7 @@ def test_the_clearance_from_a_pursuer_is_the_least_of_all_runs_to_their_end(own,
         find_neighbours(at.scene)
         if not at.near[0, 1]:
             continue
-        lay_path(0, 0, random.choice([-1.0, 1.0]), random.choice([0.0, 45.0, 180.0]), 2.0, 0, at.scene)
+        roll_out(0, 0, random.choice([-1.0, 1.0]), random.choice([0.0, 45.0, 180.0]), 2.0, 0, at.scene)
         boats, ready = at.boats, int(at.ready[0, READY_SAMPLE])
         closely = int(boats.pursuit_samples[0] + (boats.thrust_samples[0] if ready < 0 else 0))
         closely = min(closely + max(0, ready), int(boats.pursuit_samples[0] + boats.thrust_samples[0]))

@@ -8,7 +8,7 @@ from steerclear.shield.model import boats_of
 
 def looked_at(kinds, team, **settings):
     boats = boats_of(ShieldConfig(**settings), kinds, team)
-    return boats.plans, boats.n_plans
+    return boats.plans, boats.n_manoeuvres
 
 
 def test_gentle_turns_are_for_boats_with_tables_and_slow_ones_for_those_that_need_no_thrust():
@@ -20,8 +20,8 @@ def test_gentle_turns_are_for_boats_with_tables_and_slow_ones_for_those_that_nee
 
 @pytest.mark.parametrize("kind", ["surveyor", "heron", "ardurover_boat"])
 def test_either_side_is_offered_alike(kind):
-    plans, n_plans = looked_at((kind, "surveyor"), (0, 1))
-    rows = plans[0, : n_plans[0]]
+    plans, n_manoeuvres = looked_at((kind, "surveyor"), (0, 1))
+    rows = plans[0, : n_manoeuvres[0]]
     turns = rows[rows[:, 1] > 0.0]
     mirrored = turns * [-1.0, 1.0, 1.0]
     assert {tuple(row) for row in turns} == {tuple(row) for row in mirrored}

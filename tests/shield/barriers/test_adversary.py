@@ -9,7 +9,7 @@ from shield_loops import scattered
 from shield_scenes import fleet_of, relative
 from stages import stages_of
 from steerclear.shield import Shield, ShieldConfig
-from steerclear.shield.backup.rollout import lay_path
+from steerclear.shield.backup.rollout import roll_out
 from steerclear.shield.barriers.neighbours import find_neighbours
 from steerclear.shield.barriers.pursuit import clear_of_pursuer
 from steerclear.shield.batch import BatchedShield
@@ -51,7 +51,7 @@ def test_a_pursuer_holds_its_course_after_its_time():
             at = stages_of(config, state, ["heron"] * 2, [0, 1])
             find_neighbours(at.scene)
             at.fear_s[:] = time_s
-            lay_path(0, 0, 1.0, 0.0, 2.0, 0, at.scene)
+            roll_out(0, 0, 1.0, 0.0, 2.0, 0, at.scene)
             margins.append(clear_of_pursuer(0, 1, 0, -1e6, at.scene))
         assert margins[-1] <= min(margins) + 0.25, "pursuing for ever is the worst but for the strides of the run"
         narrowed += margins[0] > margins[-1] + 1.0

@@ -8,7 +8,7 @@ import pytest
 from stages import stages_of
 from steerclear.shield import ShieldConfig
 from steerclear.shield.backup.paths import Manoeuvre, Span, sail, trace_path
-from steerclear.shield.backup.rollout import lay_path
+from steerclear.shield.backup.rollout import roll_out
 from steerclear.shield.barriers.neighbours import find_neighbours
 from steerclear.shield.barriers.pursuit import clear_of_pursuer
 from steerclear.shield.model import CHASE_S, boats_of
@@ -120,7 +120,7 @@ def table_m(bearing_deg, far_m, **settings):
         [0, 1],
     )
     find_neighbours(at.scene)
-    lay_path(0, 0, 1.0, 0.0, TOP_MPS, 0, at.scene)
+    roll_out(0, 0, 1.0, 0.0, TOP_MPS, 0, at.scene)
     return clear_of_pursuer(0, 1, 0, -1e6, at.scene)
 
 

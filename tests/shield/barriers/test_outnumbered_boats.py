@@ -7,7 +7,7 @@ import pytest
 from stages import stages_of
 from steerclear.shield import ShieldConfig
 from steerclear.shield.backup.paths import READY_HEADING, READY_SAMPLE, READY_SPEED, sail
-from steerclear.shield.backup.rollout import lay_path
+from steerclear.shield.backup.rollout import roll_out
 from steerclear.shield.barriers.neighbours import find_neighbours
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.usv import fresh_state
@@ -32,7 +32,7 @@ def looked_around(*rows):
 
 def rolled_out(at, side=1.0, turn_deg=90.0, speed_mps=3.0, done=0):
     at.next_state[0] = at.state[0]
-    lay_path(0, 0, side, turn_deg, speed_mps, done, at.scene)
+    roll_out(0, 0, side, turn_deg, speed_mps, done, at.scene)
 
 
 def test_one_opponent_outnumbers_nobody_and_two_that_the_tables_tell_of_do():

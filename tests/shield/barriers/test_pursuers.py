@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from stages import stages_of
 from steerclear.shield import ShieldConfig
-from steerclear.shield.backup.rollout import lay_path
+from steerclear.shield.backup.rollout import roll_out
 from steerclear.shield.barriers.neighbours import find_neighbours
 from steerclear.shield.barriers.pursuit import clear_of_pursuer
 from steerclear.shield.platforms import get_platform
@@ -59,7 +59,7 @@ def modelled(name, own, pursuer, side, turn_deg):
     )
     find_neighbours(at.scene)
     top = get_platform(name).max_speed_mps
-    lay_path(0, 0, side, turn_deg, top, 0, at.scene)
+    roll_out(0, 0, side, turn_deg, top, 0, at.scene)
     margin_m = clear_of_pursuer(0, 1, 0, -1e6, at.scene)
     return margin_m, int(at.boats.pursuit_samples[0]) * at.boats.stride
 

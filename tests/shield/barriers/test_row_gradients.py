@@ -5,7 +5,7 @@ import pytest
 from shield_loops import fill, packed
 from stages import built, screened, stages_of
 from steerclear.shield import ShieldConfig, Surroundings
-from steerclear.shield.backup.rollout import lay_path
+from steerclear.shield.backup.rollout import roll_out
 from steerclear.shield.barriers.boats import clear_of_boat
 from steerclear.shield.barriers.clearance import FAR, MARGIN
 from steerclear.shield.barriers.static import clear_of_near_obstacles, clear_of_static
@@ -51,7 +51,7 @@ class Linearised:
             turn = z[2 * m] * at.gain[i, 2]
             commands[i] = speed, command_for_turn(params, at.state[i], speed, turn, at.tuning.dt_s)
             nominal.predict(i, commands, at.scene)
-            lay_path(i, i, *self.manoeuvres[i], 1, at.scene)
+            roll_out(i, i, *self.manoeuvres[i], 1, at.scene)
 
     def margin(self, z):
         """Exact margin of the row's boat from what the row is about."""

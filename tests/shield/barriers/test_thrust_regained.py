@@ -8,7 +8,7 @@ import pytest
 from shield_loops import step_all
 from stages import stages_of
 from steerclear.shield import ShieldConfig
-from steerclear.shield.backup.rollout import lay_path
+from steerclear.shield.backup.rollout import roll_out
 from steerclear.shield.barriers.neighbours import find_neighbours
 from steerclear.shield.barriers.pursuit import clear_of_pursuer
 from steerclear.shield.batch import BatchedShield
@@ -49,7 +49,7 @@ def test_who_comes_near_only_while_thrust_is_built_up_is_seen_coming():
     """Straight on from rest against a boat 11.5 m astern at 2 m/s: still 5 m away after 6 s, 2 m after 19 s."""
     for thrust, speed_mps, fails in [(0.0, 0.0, True), (100.0, 2.0, False)]:
         at = nimble(thrust, speed_mps, fresh_state(0.0, -11.5, 0.0, 2.0))
-        lay_path(0, 0, 1.0, 0.0, 2.0, 0, at.scene)
+        roll_out(0, 0, 1.0, 0.0, 2.0, 0, at.scene)
         assert (clear_of_pursuer(0, 1, 0, -1e6, at.scene) < 0.0) == fails
 
 

@@ -93,7 +93,7 @@ def test_a_shield_for_games_takes_their_step_and_can_leave_the_flag_out():
     ],
 )
 def test_the_shield_of_other_games_is_refused(games, words):
-    """It would foresee other boats than are there, and keep nobody apart."""
+    """It would predict_game_controlled other boats than are there, and keep nobody apart."""
     core, shield = BatchedMctf("aamas2024", n_games=GAMES), games_shield(games)
     with pytest.raises(ConfigError, match=words):
         TeamBatch(core, shield=shield)
