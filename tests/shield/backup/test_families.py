@@ -8,7 +8,7 @@ from steerclear.shield.model import boats_of
 
 def looked_at(kinds, team, **settings):
     boats = boats_of(ShieldConfig(**settings), kinds, team)
-    return boats.plans, boats.n_manoeuvres
+    return boats.manoeuvres, boats.n_manoeuvres
 
 
 def test_gentle_turns_are_for_boats_with_tables_and_slow_ones_for_those_that_need_no_thrust():

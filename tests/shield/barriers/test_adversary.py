@@ -50,7 +50,7 @@ def test_a_pursuer_holds_its_course_after_its_time():
             config = ShieldConfig(adversary_horizon_s=time_s, opponent_model="turning_circle", margin_cap_m=50.0)
             at = stages_of(config, state, ["heron"] * 2, [0, 1])
             find_neighbours(at.scene)
-            at.fear_s[:] = time_s
+            at.adversary_horizon_s[:] = time_s
             roll_out(0, 0, 1.0, 0.0, 2.0, 0, at.scene)
             margins.append(clear_of_pursuer(0, 1, 0, -1e6, at.scene))
         assert margins[-1] <= min(margins) + 0.25, "pursuing for ever is the worst but for the strides of the run"
