@@ -1,4 +1,4 @@
-"""The benchmark: what it measures, what it is judged by, and its figures as tables."""
+"""The benchmark: measurements, goals, and tables of the results."""
 
 from __future__ import annotations
 
@@ -33,31 +33,31 @@ from .provenance import head_of
 from .tables import Table, number_text
 
 POLICIES = ("random", "easy", "medium", "hard")
-"""Policies of timed decisions and batched games, from those that get in each other's way to those that seldom do."""
+"""Policies of timed decisions and batched games, from those with many conflicts to those with few."""
 
 
 HEADS = ("p50", "p99", "p99.9")
 PART_HEADS = ("check", "after it", "Python")
 LARGE_MS = {100: 15.0, 1000: 300.0}
-"""What a decision for so many boats may take, ms."""
+"""Longest decision by number of boats, ms."""
 
 
 @dataclass(frozen=True)
 class BenchSettings:
-    """How much to measure.
+    """Extent of the benchmark.
 
     Attributes:
         preset: rules of the games.
-        table_preset: rules of games whose boats look opponents up in value tables; they are timed as well.
-        seed: of everything drawn.
-        repeats: times each decision and program is timed; its median counts.
+        table_preset: rules of games whose boats use value tables; they are timed as well.
+        seed: of all random draws.
+        repeats: how often each decision and program is timed; the median counts.
         game_s: length of the games that states are taken from, s.
         lookups: look-ups in a value table.
         programs: programs for the solvers, at most.
         batch: size of the batched runs.
-        games: games at once of each policy, and of one thread against several.
-        games_at_once: numbers of games that the cost of a game is measured with.
-        threads: threads of the shield that are held against one.
+        games: simultaneous games in the runs of each policy.
+        games_at_once: numbers of simultaneous games, timed with one thread and with ``threads``.
+        threads: threads of the shield, compared with one.
         memory_games: games whose memory is measured.
         scenes: random scenes for the smallest fleet; fewer for larger ones.
         counts: sizes of fleets.
@@ -83,16 +83,16 @@ class BenchSettings:
 
     @property
     def presets(self) -> tuple[str, ...]:
-        """Both, or the one they both are."""
+        """Both presets, or one if they are the same."""
         return tuple(dict.fromkeys((self.preset, self.table_preset)))
 
     def small(self) -> BenchSettings:
-        """Return a version of seconds instead of minutes; its figures are rough."""
+        """Return a version that takes seconds instead of minutes; its figures are rough."""
         fewer = replace(self, repeats=1, game_s=20.0, lookups=20_000, programs=30, scenes=10, counts=self.counts[:2])
         return replace(fewer, batch=BatchSize(game_steps=640, repeats=2), games=32, games_at_once=(32, 64))
 
     def batch_runs(self) -> list[BatchRun]:
-        """Policies with a shield and without, numbers of games, and threads, each once."""
+        """Return the distinct batch runs: policies with and without shield, numbers of games, and threads."""
         found = [
             BatchRun(preset, policy, shielded, self.games)
             for preset in self.presets
@@ -106,17 +106,17 @@ class BenchSettings:
 
 
 def run_bench(settings: BenchSettings, notice: Callable[[str], None] = lambda words: None) -> dict[str, Any]:
-    """Measure everything, one thing after another in this process: what is timed shares its cores with nothing of ours.
+    """Measure everything in sequence in this process, so that measurements do not share cores.
 
     Args:
-        settings: how much.
-        notice: told what is being measured.
+        settings: extent of the benchmark.
+        notice: called with what is being measured.
 
     Returns:
         JSON-ready, see ``bench`` in `docs.KEYS`.
     """
     started, content = time.perf_counter(), dict[str, Any]()
-    shield = ShieldConfig(separation_m=RADII_M[0])  # in every game the same shield
+    shield = ShieldConfig(separation_m=RADII_M[0])  # the same in all games
     seed, repeats, game_s = settings.seed, settings.repeats, settings.game_s
     asked = list[tuple[str, list[list[Question]]]]()
     for key, preset in (("decide", settings.preset), ("decide_by_table", settings.table_preset)):
@@ -160,7 +160,7 @@ def _scaled(settings: BenchSettings, platform: str, boats: int, shield: ShieldCo
 
 
 def bench_goals(content: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Judge the figures; the slowest of the policies counts for games without a shield, `medium` for those with one."""
+    """Judge the figures: without a shield by the slowest policy, with one by `medium`."""
     asked, memory = content["settings"], content["memory"]
     preset, table_preset, games = asked["preset"], asked["table_preset"], asked["games"]
     decide, by_table = content["decide"]["all"], content["decide_by_table"]["all"]
@@ -188,7 +188,7 @@ def bench_goals(content: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _rows(rows: Sequence[Mapping[str, Any]], **fields: Any) -> list[Mapping[str, Any]]:
-    """Those of these fields."""
+    """Return the rows with these field values."""
     return [row for row in rows if all(row[name] == value for name, value in fields.items())]
 
 
@@ -202,7 +202,7 @@ def _shown(row: Mapping[str, Any], names: Sequence[str] = tuple(QUANTILES)) -> l
 
 
 def _decision_tables(content: Mapping[str, Any]) -> list[Table]:
-    """What a decision costs: of what comes of it, of each policy, and where the time goes."""
+    """Return tables of decision times: by outcome, by policy, and by part."""
     made, repeats = [], content["settings"]["repeats"]
     for key, about in (("decide", "3 boats and 3 opponents"), ("decide_by_table", "with value tables (surveyors)")):
         decide, share = content[key], content[key]["share_intervening"]
@@ -229,7 +229,7 @@ def _decision_tables(content: Mapping[str, Any]) -> list[Table]:
 
 
 def _part_tables(content: Mapping[str, Any]) -> list[Table]:
-    """Look-ups, solvers and memory."""
+    """Return tables of look-ups, solvers and memory."""
     memory, lookups = content["memory"], content["lookups"]
     solvers = [
         [
@@ -250,7 +250,7 @@ def _part_tables(content: Mapping[str, Any]) -> list[Table]:
 
 
 def _batch_tables(content: Mapping[str, Any]) -> list[Table]:
-    """Games at once: of each policy, and of so many games with one thread and with several."""
+    """Return tables of batched games: by policy, and by number of games with one and several threads."""
     asked, batch = content["settings"], content["batch"]
     policies, games = [], []
     for bare in _rows(batch, shielded=False):

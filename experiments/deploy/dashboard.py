@@ -1,4 +1,4 @@
-"""`Dashboard`: what an operator sees on a terminal, and what the keys do; neither ever makes the loop wait."""
+"""`Dashboard`: the operator's terminal display and keys; neither ever makes the loop wait."""
 
 from __future__ import annotations
 
@@ -47,17 +47,17 @@ TITLES = {
     "subject": "{condition}: for which boat?",
     "duration": "{condition} of {whom}: for how long? It disables {disabled}",
 }
-"""What each menu asks."""
+"""Question of each menu."""
 OPENS = {"o": "condition", "t": "take"}
 WAIT_S = 0.1
 _NO_KEY = b"\x00"
 
 
 class Controls:
-    """Turns keys into calls of the operator. A stop key is obeyed whatever menu is open.
+    """Turns keys into calls of the operator. A stop key works whatever menu is open.
 
-    Once boats are told to stop through the shield, a stop key asks whether they are to stop past it. Only another key
-    answers that: no double tap and no key held down drops the shield.
+    If boats already stop through the shield, a stop key asks whether to stop past it. Only another key can confirm, so
+    neither a double tap nor a held key switches the shield off.
     """
 
     def __init__(self, fleet: FleetFile, operator: Operator, clock: Clock) -> None:
@@ -79,7 +79,7 @@ class Controls:
         self._options = {menu: dict(zip(DIGITS, entries, strict=False)) for menu, entries in options.items()}
 
     def press(self, key: str) -> None:
-        """Act on a key; keys that mean nothing are ignored."""
+        """Act on a key; unknown keys are ignored."""
         with self._lock:
             asked, self._open = self._open, ""
             if key in STOP_KEYS:
@@ -99,7 +99,7 @@ class Controls:
                 self._command(key.lower())
 
     def menu(self) -> list[str]:
-        """Lines of the open menu; empty: none is open."""
+        """Return the lines of the open menu; empty if none is open."""
         with self._lock:
             if not self._open:
                 return []
@@ -137,17 +137,17 @@ class Controls:
 
 
 class Keyboard:
-    """Calls a function for every key, from a thread of its own, until closed. Ctrl-C stays what it is.
+    """Calls a function for every key, from its own thread, until closed. Ctrl-C works as usual.
 
-    Does nothing when the input is no terminal or the system has none that gives single keys, and while the process is
-    in the background: reading or setting the terminal there would stop the whole process, and with it the boats.
+    It does nothing if the input is not a terminal with single keys, or while the process is in the background: terminal
+    access would then stop the process, and with it the boats.
 
     Args:
-        pressed: called with each key, one character; what it raises is logged.
+        pressed: called with each key, one character; its exceptions are logged.
         descriptor: of the terminal; None: standard input.
 
     Attributes:
-        is_terminal: whether keys can come at all.
+        is_terminal: whether keys can arrive at all.
     """
 
     def __init__(self, pressed: Callable[[str], None], descriptor: int | None = None) -> None:
@@ -165,7 +165,7 @@ class Keyboard:
             logger.warning("this system gives no single keys to programs; stop with Ctrl-C")
 
     def close(self) -> None:
-        """Leave the terminal as it was found; may be called again."""
+        """Restore the terminal; may be called again."""
         self._closing.set()
         if self._thread.is_alive() and threading.current_thread() is not self._thread:
             self._thread.join(timeout=2.0)
@@ -200,9 +200,9 @@ class Keyboard:
                 logger.exception("key %r failed", key)
 
     def _take_over(self, descriptor: int) -> None:
-        """Keys one by one and unseen; repeated, since a shell may have set the terminal back meanwhile.
+        """Switch to single keys without echo; repeated, since a shell may have reset the terminal meanwhile.
 
-        Ctrl-Z would stop the process, and with it the shield; Ctrl-S would freeze the picture. Both are taken away.
+        Ctrl-Z and Ctrl-S are disabled: they would stop the process with the shield, or freeze the display.
         """
         present = termios.tcgetattr(descriptor)
         self._before = self._before or termios.tcgetattr(descriptor)
@@ -215,7 +215,7 @@ class Keyboard:
 
 
 def _in_foreground(descriptor: int) -> bool:
-    """Whether the terminal lets us read; one that does not control us always does."""
+    """Whether the terminal may be read; true for one that does not control this process."""
     try:
         return os.tcgetpgrp(descriptor) == os.getpgrp()
     except OSError:
@@ -224,23 +224,23 @@ def _in_foreground(descriptor: int) -> bool:
 
 REFRESH_HZ = 4.0
 LOG_LINES = 3
-"""Lines of the log on the screen."""
+"""Number of log lines on the screen."""
 LATE_OF = 100
-"""Ticks that the shown delays are of."""
+"""Number of latest ticks over which delays are shown."""
 
 
 class Dashboard:
-    """A `TickSink` that shows the latest tick, and takes keys. A thread draws, another listens to the keyboard.
+    """A `TickSink` that shows the latest tick and takes keys, with one thread to draw and one for the keyboard.
 
-    It draws when a tick has come, so while the loop rests till the next, and when a key was pressed. Keys act at once
-    and do not wait for the picture; when drawing fails, they go on.
+    It draws after a tick, while the loop waits for the next, or after a key. Keys act immediately, and still work if
+    drawing fails.
 
     Args:
         fleet, clock: the loop's.
-        operator: gets what the keys ask for.
+        operator: receives the keys' requests.
         console: where to draw; None: standard output.
-        keyboard: descriptor of the terminal that keys come from; None: standard input.
-        refresh_hz: pictures a second, at most.
+        keyboard: descriptor of the terminal for keys; None: standard input.
+        refresh_hz: highest rate of drawing.
     """
 
     def __init__(
@@ -270,7 +270,7 @@ class Dashboard:
         atexit.register(self.close)
 
     def take(self, tick: Tick) -> None:
-        """Show this tick from the next picture on."""
+        """Show this tick at the next redraw."""
         self._tick = tick
         self._late_s.append(tick.began_s - tick.due_s)
         if time.monotonic() - self._drawn_s >= self._period_s:
@@ -282,7 +282,7 @@ class Dashboard:
         self._wake.set()
 
     def moment(self) -> Moment:
-        """What is to be shown now."""
+        """Return what to show now."""
         late_s = tuple(self._late_s) or (0.0,)
         return Moment(
             tick=self._tick,
@@ -296,7 +296,7 @@ class Dashboard:
         )
 
     def close(self) -> None:
-        """Give the terminal back and repeat on it what was logged meanwhile; may be called again."""
+        """Restore the terminal and print what was logged meanwhile; may be called again."""
         if self._closing:
             return
         self._closing = True
@@ -305,7 +305,7 @@ class Dashboard:
         self._thread.join(timeout=5.0)
         atexit.unregister(self.close)
         if self._thread.is_alive():
-            return  # the terminal takes nothing any more; what would be written now would wait for ever
+            return  # the terminal accepts no output; printing would block for ever
         for line in self._log.lines:
             self._console.print(line, markup=False, soft_wrap=True)
 
@@ -318,12 +318,12 @@ class Dashboard:
                     live.update(self._view.of(self.moment(), size.width, size.height), refresh=True)
                     self._wake.wait(max(self._period_s, SILENT_S))
                     self._wake.clear()
-        except Exception:  # boats go on without a picture; the keys still work
+        except Exception:  # boats continue without a display; the keys still work
             logger.exception("the dashboard cannot be drawn any more; keys still work: SPACE is STOP ALL")
 
 
 class LogLines(logging.Handler):
-    """Takes what is logged while the screen is in use, in place of handlers that would write over it."""
+    """Collects log lines while the screen is in use, instead of handlers that would write over it."""
 
     def __init__(self) -> None:
         super().__init__(logging.INFO)

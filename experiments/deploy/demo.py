@@ -20,14 +20,14 @@ from steerclear.shield.compat import Self
 from steerclear.shield.exceptions import BridgeError
 
 GRACE_S, END_S = 3.0, 10.0
-"""How long a program may take to end in order, s: one whose parent is gone, and one of a demonstration."""
+"""Time to end in order, s: for a program whose parent is gone, and for one of a demonstration."""
 
 
 def end_with_parent(stream: BinaryIO | None = None) -> threading.Thread:
-    """End this process in order (SIGTERM) when a stream is closed at its other end, at once `GRACE_S` later.
+    """End this process (SIGTERM, and `GRACE_S` later at once) when the other end of ``stream`` is closed.
 
-    Whoever starts a program with a pipe as its standard input holds the only other end: the system closes it also when
-    that process is killed with -9. Without a stream that is what is watched. Returns the thread that waits for it.
+    The default is standard input. A parent that gave the process a pipe as standard input holds its only other end, and
+    the system closes it even if the parent is killed. Return the waiting thread.
     """
     watched = sys.stdin.buffer if stream is None else stream
 
@@ -44,16 +44,16 @@ def end_with_parent(stream: BinaryIO | None = None) -> threading.Thread:
 
 
 FOLDER = Path("steerclear_demo")
-"""Demonstrations keep their fleet files and logs in folders of their own in here, in the present folder."""
+"""Folder for demonstrations in the current folder; each has its own subfolder with fleet file and logs."""
 
 PORTS = (14550, 14700, 14701)
-"""Ports of the file that comes with the package: links, feed, referee."""
+"""Ports in the packaged fleet file: links, feed, referee."""
 
 
 def demo_file(folder: Path = FOLDER, link: str = "mavlink") -> Path:
-    """The fleet file that comes with the package, on free ports, in a new folder where it can be looked at.
+    """Write the packaged fleet file, with free ports, to a new folder and return its path.
 
-    The folder is named after the time, UTC; ``link`` is what our boats run, mavlink or moos.
+    The folder is named after the time, UTC; ``link`` is what the own boats run, mavlink or moos.
 
     Raises:
         BridgeError: it cannot be written.
@@ -71,7 +71,7 @@ def demo_file(folder: Path = FOLDER, link: str = "mavlink") -> Path:
 
 
 def free_ports(count: int) -> list[int]:
-    """Ports of this machine that nobody has now, neither by UDP nor by TCP, all different.
+    """Return different ports of this machine that are free for both UDP and TCP.
 
     Raises:
         OSError: there is none.
@@ -98,7 +98,7 @@ def _new_folder(folder: Path) -> Path:
 class Demo:
     """Simulated boats of a fleet file, opponents and a referee. A context manager.
 
-    The processes end with this one, also when it is killed; what they say is kept beside the fleet file, whose links
+    The processes end with this one, even if it is killed. Their output is stored beside the fleet file, whose links
     must be on this machine. ``opponents``: policy of the other team; ``more``: further options of ``sim-boats``.
 
     Raises:
@@ -116,7 +116,7 @@ class Demo:
         self._files: dict[str, IO[bytes]] = {}
 
     def fault(self) -> str:
-        """Which process ended and what it said last; empty: all run."""
+        """Return which process ended and its last output line; empty if all run."""
         for name, process in self._processes.items():
             if process.poll() is not None:
                 said = self._said(name)
@@ -124,10 +124,10 @@ class Demo:
         return ""
 
     def wait(self, timeout_s: float) -> None:
-        """Wait until the boats live; the first time all of it is compiled.
+        """Wait until the boats are simulated; the first time includes compilation.
 
         Raises:
-            BridgeError: a process ended, or the boats do not come.
+            BridgeError: a process ended, or the boats did not start in time.
         """
         end = time.monotonic() + timeout_s
         while "Simulated boats" not in self._said("boats"):
@@ -141,7 +141,7 @@ class Demo:
         return Path(self._files[name].name).read_text(encoding="utf-8", errors="replace").strip()
 
     def close(self, patience_s: float = END_S) -> None:
-        """End the processes, those that do not end in so long, s, at once; may be called again."""
+        """End the processes, and kill those that take longer than ``patience_s``; may be called again."""
         for process in self._processes.values():
             with contextlib.suppress(OSError):
                 process.terminate()

@@ -1,6 +1,6 @@
-"""What `deploy`, `preflight`, `referee` and `replay` write as JSON: every key, with meaning and unit.
+"""JSON keys of `deploy`, `preflight`, `referee` and `replay`, with meaning and unit.
 
-Figures of a run are data: `Figure` documents its key and says how the terminal shows it.
+A `Figure` documents its key and says how the terminal shows it.
 """
 
 from __future__ import annotations
@@ -61,11 +61,11 @@ FIGURES = (
     Figure("read_to_sent_max_s", "the same, the worst, s"),
     Figure("decide_p99_s", "the shield's decision alone, 99 of 100, s"),
 )
-"""Of a run, in the order of the table."""
+"""Figures of a run, in the order of the table."""
 
 
 def figure_rows(figures: Mapping[str, float]) -> list[tuple[str, str]]:
-    """The rows of the terminal's table: label and value; inf: nobody else was there."""
+    """Return the rows of the terminal's table: label and value; inf: nobody else was there."""
     rows = [(one, figures[one.key]) for one in FIGURES if one.label]
     return [
         (one.label, "no other boat" if math.isinf(value) else f"{one.factor * value:.{one.digits}f} {one.unit}".strip())

@@ -1,4 +1,4 @@
-"""Counts of a run, and a line now and then about it."""
+"""Counts of a run, and regular status lines."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from steerclear.shield.fleet import Fleet
 from steerclear.shield.platforms import layout as L
 
 EVERY_S = 5.0
-"""Between two lines, s."""
+"""Time between two lines, s."""
 LINES = {
     "time": ("{:6.0f} s", f"seconds since the first turn; a line every {EVERY_S:g} s"),
     "alone": ("no other boat", "nobody else is known: nothing to keep clear of"),
@@ -32,16 +32,16 @@ LINES = {
         "a response in effect and why; once, and of a boat outside the operating area every time",
     ),
 }
-"""What the lines say: words, what they mean and what to do; the operator's page is made of it."""
+"""Text of the lines, and what they mean and what to do; the operator's page is made from it."""
 
 
 class Tally:
-    """Counts decisions and keeps the closest approach of own boats to any other; a `TickSink`.
+    """Counts decisions and records the own boats' closest approach to any other; a `TickSink`.
 
     Attributes:
         ticks, decided: turns of the loop, and those with a decision.
-        commands, changed, best_effort: of own boats that were decided; of these, by the shield, and as it could.
-        responses: turns in which a declared response did something.
+        commands, changed, best_effort: decided commands of own boats; of these, changed, and best effort.
+        responses: turns in which a declared response had an effect.
         closest_m: closest approach, as believed, m; inf: nobody else was there.
         least_m: smallest safety margin of an own boat, m.
     """
@@ -66,10 +66,10 @@ class Tally:
         self.closest_m = min(self.closest_m, closest_m(tick.fleet))
 
     def close(self) -> None:
-        """Nothing to finish."""
+        """Do nothing."""
 
     def figures(self) -> dict[str, float]:
-        """These figures, by their keys in `keys.FIGURES`."""
+        """Return the figures by their keys in `keys.FIGURES`."""
         return {
             "ticks": float(self.ticks),
             "decided": float(self.decided),
@@ -82,7 +82,7 @@ class Tally:
 
 
 def closest_m(fleet: Fleet) -> float:
-    """Smallest distance of a controlled boat from any other, m, where they are believed to be."""
+    """Return the smallest distance of a controlled boat to any other, by believed positions, m."""
     at = fleet.state[:, [L.X, L.Y]]
     apart = np.hypot(*np.moveaxis(at[:, None] - at[None], -1, 0))
     np.fill_diagonal(apart, np.inf)
@@ -90,10 +90,10 @@ def closest_m(fleet: Fleet) -> float:
 
 
 class PlainLines:
-    """A sink that says how it went since the last line, every few seconds, from a thread of its own.
+    """A sink that prints a status line every few seconds, from its own thread.
 
-    What is declared of a boat is said once, and again when its response changes or it comes back; of one outside the
-    geofence every time, since how far matters.
+    A declared response is printed once, and again when it changes or returns; one for a boat outside the geofence every
+    time, since the distance matters.
     """
 
     def __init__(self, say: Callable[[str], None], every_s: float = EVERY_S) -> None:
@@ -107,14 +107,14 @@ class PlainLines:
         self._thread.start()
 
     def take(self, tick: Tick) -> None:
-        """Have this tick told next."""
+        """Use this tick for the next line."""
         if self._tick is None:
             self._began_s = tick.began_s
         self._tick = tick
         self._tally.take(tick)
 
     def close(self) -> None:
-        """Say the last and end."""
+        """Stop the thread."""
         self._closing.set()
         self._thread.join(2.0)
 
@@ -123,7 +123,7 @@ class PlainLines:
             tick = self._tick
             if tick is None:
                 continue
-            since, self._tally = self._tally, Tally()  # no lock: the loop is never to wait for this thread
+            since, self._tally = self._tally, Tally()  # no lock: the loop must never wait for this thread
             said = [_say("undecided")]
             if tick.fleet is not None and tick.decisions is not None:
                 near = _say("alone") if math.isinf(since.closest_m) else _say("closest", since.closest_m)

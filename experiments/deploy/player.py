@@ -1,7 +1,7 @@
-"""A policy that plays on what the loop saw, in a process of its own: the game as it sees it, and its answers.
+"""A policy in a process of its own: it observes the game as the loop saw it, and answers with commands.
 
-The process is forked by `entries.sandbox`, which ends it when the runner is gone. It reads pickled `Orders`, then
-snapshots, and answers JSON.
+`entries.sandbox` forks the process and ends it when the runner is gone. It reads pickled `Orders`, then snapshots,
+and answers in JSON.
 """
 
 from __future__ import annotations
@@ -35,24 +35,24 @@ from steerclear.shield.platforms.usv import wrap_degrees
 from .referee import game_config, stand_in_config
 
 NEED_NO_GAME = ("hold", "random", "waypoints")
-"""Policies that look at no flag and at nobody: they also steer boats that play no game."""
+"""Policies that use neither flags nor other boats; they can also steer boats that play no game."""
 NOBODY = -1
 RESTART_S = 1.0
-"""A game whose clock goes back by more than this is a new one."""
+"""If the game clock goes back by more than this, a new game has begun, s."""
 FAILED = 3
-"""Exit status when the policy could not be loaded; the answer before it says why."""
+"""Exit status if the policy could not be loaded; the answer before it gives the reason."""
 GRACE_S = 5.0
-"""Time the supervisor has to end this process once the runner is gone, s."""
+"""Time the supervisor has to end this process after the runner is gone, s."""
 
 
 @dataclass(frozen=True)
 class Cast:
-    """Which boat of a fleet plays which agent of a game.
+    """Assignment of a fleet's boats to the agents of a game.
 
     Attributes:
         names: all boats of the file, in its order.
-        rows: number in ``names`` of each agent's boat, agent_0 first; `NOBODY` for agents of a game without opponents.
-        ours: agents the policy plays.
+        rows: index in ``names`` of each agent's boat, agent_0 first; `NOBODY` for agents without a boat.
+        ours: agents that the policy plays.
     """
 
     config: GameConfig
@@ -62,25 +62,25 @@ class Cast:
 
     @property
     def players(self) -> tuple[str, ...]:
-        """Names of the boats that play, agent_0 first; empty for those that are nobody."""
+        """Names of the agents' boats, agent_0 first; empty for agents without a boat."""
         return tuple("" if row == NOBODY else self.names[row] for row in self.rows)
 
     @property
     def there(self) -> tuple[list[int], list[int]]:
-        """Numbers of the agents that have a boat, and in ``names`` of their boats."""
+        """Numbers of the agents that have a boat, and the indices of their boats in ``names``."""
         return [i for i, row in enumerate(self.rows) if row != NOBODY], [row for row in self.rows if row != NOBODY]
 
 
 def cast_of(fleet: FleetFile, boats: Sequence[str] | None = None, policy: str = "") -> Cast:
-    """The cast of a fleet file. Where no boat plays, our boats are a team without opponents.
+    """Return the cast of a fleet file. If no boat plays, the own boats form a team without opponents.
 
     Args:
         fleet: the file.
-        boats: the boats the policy plays; None: all that a process commands for our team, see `FleetFile.commanded`.
-        policy: its name, which says whether it needs a game.
+        boats: the boats the policy plays; None: all that a process commands for the team, see `FleetFile.commanded`.
+        policy: its name, which tells whether it needs a game.
 
     Raises:
-        FleetFileError: the file has no game and the policy needs one, or one of the boats does not play.
+        FleetFileError: the policy needs a game and the file has none, or one of the boats does not play.
     """
     wanted = [boat.name for boat in fleet.commanded()] if boats is None else list(boats)
     if fleet.agent_ids:
@@ -99,10 +99,10 @@ def cast_of(fleet: FleetFile, boats: Sequence[str] | None = None, policy: str = 
 
 
 class Observer:
-    """An `MctfEnv` that shows what the loop saw; nothing in it moves by itself.
+    """An `MctfEnv` set to what the loop saw; it never steps.
 
-    A boat never seen is shown at its start, tagged, at rest. Without word from a referee the game is as at its start.
-    Speeds astern are shown as 0, since boats of the game have none.
+    A boat never seen appears at its start, tagged and at rest. Without a referee the game is in its initial state.
+    Speeds astern appear as 0, since the game's boats have none.
     """
 
     def __init__(self, cast: Cast) -> None:
@@ -117,11 +117,11 @@ class Observer:
         """Set the env to a snapshot.
 
         Returns:
-            Whether this begins a new game: the first snapshot, or the game's clock went back.
+            Whether a new game begins: this is the first snapshot, or the game's clock went back.
 
         Raises:
             FleetError: the snapshot is of other boats.
-            FeedError: the state of the game in it cannot be used.
+            FeedError: its game state cannot be used.
         """
         seen = self._agents_seen(snapshot)
         game = game_state(snapshot.game) if snapshot.game else None
@@ -147,11 +147,11 @@ class Observer:
         return begins
 
     def observations(self) -> dict[str, np.ndarray]:
-        """Observations of all agents, as `MctfEnv.step` answers them."""
+        """Return the observations of all agents, as `MctfEnv.step` does."""
         return dict(zip(self.env.possible_agents, self.env.core.observe()[0].copy(), strict=True))
 
     def infos(self) -> dict[str, dict[str, Any]]:
-        """Infos of all agents, as `MctfEnv.step` answers them."""
+        """Return the infos of all agents, as `MctfEnv.step` does."""
         return self.env.infos()
 
     def _agents_seen(self, snapshot: Snapshot) -> Array:
@@ -165,7 +165,7 @@ class Observer:
         return rows
 
     def _with_game(self, view: Any, game: GameState, lost: Array) -> Any:
-        """The view with the referee's word; a flag carried by a boat in sight is where that boat is."""
+        """Add the referee's game state to the view; a carried flag is at its carrier if that boat was seen."""
         told = {"is_tagged": "tagged", "tagging_cooldown_s": "cooldown_s"}
         told |= {name: name for name in ("has_flag", "oob", "on_side", "driven")}
         arrays = {name: np.array(getattr(view, name)) for name in told}
@@ -188,13 +188,13 @@ class Observer:
 
 @dataclass(frozen=True)
 class Orders:
-    """What a process is to play: pickled and sent to it.
+    """First message to the process, pickled.
 
     Attributes:
-        cast: who plays.
+        cast: boats and agents.
         policy: name or path, as `steerclear.policies.make` takes it.
         options: of the policy.
-        seed: of everything it draws; a second game is played from seed + 1, and so on.
+        seed: of all random draws; the second game uses seed + 1, and so on.
     """
 
     cast: Cast
@@ -204,12 +204,12 @@ class Orders:
 
 
 class Play(NamedTuple):
-    """A policy's answer to one snapshot; NaN: no usable answer, or not played by this policy.
+    """A policy's answer to one snapshot; NaN: no usable answer, or a boat that this policy does not play.
 
     Attributes:
-        relative: (n_agents, 2) what each agent's boat is to obey: speed m/s, heading deg relative to its own.
-        driven: (n_agents,) boats the game drives: tagged, or out of bounds.
-        commands: (n_boats, 2) the same for all boats of the file: speed m/s up to its top speed, absolute heading rad.
+        relative: (n_agents, 2) command of each agent's boat: speed m/s, heading deg relative to its own.
+        driven: (n_agents,) game-controlled boats: tagged, or out of bounds.
+        commands: (n_boats, 2) the same for all boats of the file: speed m/s up to top speed, absolute heading rad.
         problems: what was wrong with single boats' answers, a line each.
     """
 
@@ -220,7 +220,7 @@ class Play(NamedTuple):
 
 
 class Player:
-    """A policy in the game that snapshots show, with the game's own drive home of tagged and out-of-bounds boats.
+    """Plays a policy in the game that snapshots show; the game itself steers tagged and out-of-bounds boats home.
 
     Raises:
         PolicyError: the policy is unknown, cannot be loaded, or cannot play this game.
@@ -235,14 +235,14 @@ class Player:
         self._games = 0
 
     def warm_up(self) -> None:
-        """Play one step of a game nobody sees, so that what compiles or loads late does it now."""
+        """Play one step of an unused game, so that compilation and lazy imports happen before the first snapshot."""
         if self._cast.ours:
             self._begin()
             self._ask()
         self._games = 0
 
     def play(self, snapshot: Snapshot) -> Play:
-        """Answer a snapshot; what the policy raises is a problem of its boats.
+        """Answer a snapshot; an exception in the policy's ``act`` becomes a problem of its boats.
 
         Raises:
             SteerclearError: the snapshot cannot be used, or the policy cannot begin a game.
@@ -266,7 +266,7 @@ class Player:
         return Play(relative, driven, commands, texts)
 
     def close(self) -> None:
-        """Let the policy give back what it holds."""
+        """Let the policy release its resources."""
         if hasattr(self.policy, "close"):
             self.policy.close()
 
@@ -275,7 +275,7 @@ class Player:
         self._games += 1
 
     def _ask(self) -> tuple[dict[str, Any], dict[str, str]]:
-        """Actions of our agents, a stop for those without a usable one, and what was wrong with these."""
+        """Return actions of the own agents and their problems; an agent without a usable action stops."""
         ours = self._cast.ours
         try:
             answer = self.policy.act(self.observer.observations(), self.observer.infos())
@@ -292,7 +292,7 @@ class Player:
 
 
 def load_player(orders: Orders) -> Player:
-    """A player that has played a step; whatever the policy raises on the way is a `PolicyError`.
+    """Return a warmed-up player; any exception of the policy becomes a `PolicyError`.
 
     Raises:
         PolicyError: the policy is unknown, cannot be loaded, or cannot play this game.
@@ -312,7 +312,7 @@ def _line(error: BaseException, most: int = 300) -> str:
 
 
 class Latest:
-    """The latest snapshot, received by a thread, so that a slow policy skips those it was too late for."""
+    """Receives snapshots in a thread and holds the latest, so that a slow policy skips outdated ones."""
 
     def __init__(self, snapshots: Connection) -> None:
         self._snapshots = snapshots
@@ -321,7 +321,7 @@ class Latest:
         threading.Thread(target=self._receive, name="snapshots", daemon=True).start()
 
     def take(self) -> bytes:
-        """The latest message not taken yet, waiting for it."""
+        """Wait for a message not taken yet, and return the latest."""
         with self._ready:
             self._ready.wait_for(lambda: self._message)
             message, self._message = self._message, b""
@@ -332,7 +332,7 @@ class Latest:
             try:
                 message = self._snapshots.recv_bytes()
             except (OSError, EOFError):
-                time.sleep(GRACE_S)  # the runner is gone, and the supervisor ends all this, whatever the policy is at
+                time.sleep(GRACE_S)  # the runner is gone; the supervisor normally ends this process first
                 os._exit(0)
             with self._ready:
                 self._message = message
@@ -340,7 +340,7 @@ class Latest:
 
 
 def serve(read_fd: int, write_fd: int, folder: str) -> int:
-    """Load the policy the first message names and answer snapshots until the runner is gone."""
+    """Load the policy named by the first message, then answer snapshots until the runner is gone."""
     snapshots, answers = Connection(read_fd, writable=False), Connection(write_fd, readable=False)
 
     def answer(**content: Any) -> None:

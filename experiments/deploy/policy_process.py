@@ -1,6 +1,6 @@
-"""`PolicyProcess`: a policy in a process of its own, so that whatever it does the loop goes on in time.
+"""`PolicyProcess`: a policy in a process of its own, so that it cannot delay the loop.
 
-Nothing here waits: each call takes what has come, sends what can be sent and looks after the process.
+Only `PolicyProcess.start` waits. Other calls read what has come, send what can be sent and check the process.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ from .worker import Broken, Worker
 logger = logging.getLogger(__name__)
 
 START_WITHIN_S = 120.0
-"""Time a policy has to load and to answer for the first time, s."""
+"""Time a policy has to load and to give its first answer, s."""
 SLOW_S = 0.3
-"""An answer that takes longer is reported as a fault."""
+"""An answer that takes longer than this is reported as a fault, s."""
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.25, 10.0
-"""Pause before a policy that died is started again, doubled each time, s."""
+"""First and longest pause before a dead policy is restarted, s; the pause doubles each time."""
 HEALTHY_S = 30.0
-"""A policy that answered for so long starts with the first pause again, s."""
+"""After answering for this long, a policy's next restart uses the first pause again, s."""
 
 
 class PolicyProcess:
@@ -94,7 +94,7 @@ class PolicyProcess:
         self.restarts = 0
 
     def start(self) -> None:
-        """Start the policy and wait until it is loaded; the only call that waits. Without it, `offer` starts it.
+        """Start the policy and wait until it is loaded. Without this call, `offer` starts it.
 
         Raises:
             PolicyError: it cannot be loaded, or not in time.
@@ -111,12 +111,12 @@ class PolicyProcess:
                 raise PolicyError(self.refused or f"policy {self.policy!r} does not start: {said}")
 
     def offer(self, snapshot: Snapshot) -> None:
-        """Show it the latest snapshot; older ones it has not looked at are dropped."""
+        """Queue the latest snapshot; it replaces one that was not sent yet."""
         self._pending = snapshot
         self._turn()
 
     def latest(self) -> Answer:
-        """Its latest answer."""
+        """Return the latest answer."""
         self._turn()
         return Answer(self._commands, self._clock.now_s() - self._taken_s, self._present_fault())
 
@@ -194,7 +194,7 @@ class PolicyProcess:
             self._commands, self._taken_s = Commands.absolute_rad(_commands(rows, self._shape)), asked.taken_s
 
     def _lose(self, what: str, now_s: float) -> None:
-        """The process is of no use any more: end it and start another after a pause."""
+        """End the process and schedule a restart."""
         self._end()
         self._ready = False
         self._fault = f"policy {self.policy} {what}; starting it again after {self._pause_s:g} s"
@@ -204,7 +204,7 @@ class PolicyProcess:
         logger.warning("%s", self._fault)
 
     def _end(self) -> None:
-        """End the present process; it is asked for again until the system has taken it."""
+        """End the current process; `_ended` holds it until the system has removed it."""
         if self._worker is not None:
             self._worker.end()
             self._ended.append(self._worker)
@@ -223,7 +223,7 @@ class PolicyProcess:
 
 
 def _commands(rows: Any, shape: tuple[int, int]) -> Array:
-    """Commands (n, 2) of an answer, NaN where it has none."""
+    """Return the commands (n, 2) of an answer, NaN where it has none."""
     try:
         values = np.array([[math.nan, math.nan] if row is None else row for row in rows], dtype=np.float64)
     except (TypeError, ValueError):

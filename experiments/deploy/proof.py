@@ -1,4 +1,4 @@
-"""Running the shield again on what a log holds: does it decide the same, bit for bit, and was that sent?"""
+"""Replays the shield on a log: are its decisions the same, bit for bit, and were they sent?"""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from steerclear.shield.bridge.messages import Sent, Tick
 from steerclear.shield.decision import Reason
 
 ROUNDED = 1e-5
-"""Messages hold numbers of 32 bits: 1e-7 of a speed and of a turn; a little more is granted, m/s or rad."""
+"""Tolerance for rounding, m/s or rad. Messages hold 32-bit numbers: relative error 1e-7 of speeds and turns."""
 OWN_STOP = "send"
-"""Condition of the action that declares that a link used its own stop for a boat that was decided for; where the shield
-decides `Reason.STOPPED`, the decision asks for it itself."""
+"""Condition of an action that declares a link's own stop for a boat with a decision. For `Reason.STOPPED` the shield
+itself requests that stop."""
 FIELDS = ("intervened", "reason", "safety_margin_m", "slack_m", "bound")
-"""Arrays of a decision that are compared, beside the sent commands; the time it took is not."""
+"""Arrays of a decision that are compared besides the filtered commands; its computing time is not."""
 
 
 class Strayed(NamedTuple):
-    """A command that does not rest on what was decided: m/s or rad; None: nothing was decided, or nothing sent."""
+    """A sent command that does not match the decision: m/s or rad; None: nothing was decided, or nothing sent."""
 
     boat: str
     what: str
@@ -34,23 +34,22 @@ class Strayed(NamedTuple):
 
 
 class SentCheck:
-    """Compares tick by tick, for the boats this process commanded or sent something.
+    """Compares sent commands with decisions, tick by tick, for boats that this process commanded or sent something to.
 
-    Different, and right: rounding of messages, the autopilot's limit, a link that cannot go astern and creeps instead,
-    a link's own stop where the tick declares it or nothing was decided for the boat, and nothing sent to a boat that
-    a person steers.
+    Allowed differences: rounding of messages, the autopilot's limit, a link that cannot go astern and creeps instead,
+    a link's own stop if the tick declares it or nothing was decided, and nothing sent to a boat that a person steers.
 
     Attributes:
-        cut: how many commands an autopilot's limit cut, by boat and limit, m/s.
+        cut: number of commands that an autopilot's limit cut, by boat and limit, m/s.
     """
 
     def __init__(self, header: LogHeader) -> None:
         self.cut: Counter[tuple[str, float]] = Counter()
         self._ours = [boat.name for boat in header.boats if boat.ours]
-        self._is_team = header.config.coordination == "team"  # then nobody else steers a boat the shield decides for
+        self._is_team = header.config.coordination == "team"  # then only this process steers the shield's boats
 
     def strayed(self, tick: Tick) -> list[Strayed]:
-        """What does not fit in a tick."""
+        """Return the mismatches in a tick."""
         decided = {}
         if tick.decisions is not None:
             fleet, filtered = tick.decisions.fleet, tick.decisions.filtered
@@ -80,23 +79,23 @@ class SentCheck:
 
 
 def _stops(sent: Sent) -> bool:
-    """Whether it is a link's own stop, or nothing left at all."""
+    """Whether it is a link's own stop, or nothing was sent."""
     if math.isnan(sent.speed_mps):
         return not sent.delivered
     return abs(sent.speed_mps) <= CREEP_MPS + ROUNDED
 
 
 def _declares_stop(tick: Tick, name: str) -> bool:
-    decisions = tick.decisions  # numbers are compared: those of a damaged log need be no reason's
+    decisions = tick.decisions  # compared as numbers: in a damaged log they need not be valid reasons
     pairs = () if decisions is None else zip(decisions.fleet.names, decisions.reason.tolist(), strict=False)
     declared = ((action.subject, action.condition) for action in tick.actions)
     return (name, Reason.STOPPED) in pairs or (name, OWN_STOP) in declared
 
 
 class Difference(NamedTuple):
-    """Where a decision differs from the recorded one, or what was sent from it; values to the last bit.
+    """A decision, or a sent command, that differs from the recorded one; values are exact.
 
-    ``time_s`` counts since the log began; ``boat`` is "" when it is about all.
+    ``time_s`` counts from the start of the log; ``boat`` is "" if it concerns all.
     """
 
     tick: int
@@ -109,7 +108,7 @@ class Difference(NamedTuple):
 
 @dataclass
 class Proof:
-    """What the replay found: counts and the first of each, see `keys.REPLAY`; ``covered``: with a boat of ours."""
+    """Result of a replay: counts and the first of each, see `keys.REPLAY`; ``covered``: decisions for an own boat."""
 
     ticks: int = 0
     decisions: int = 0
@@ -126,20 +125,20 @@ class Proof:
 
     @property
     def holds(self) -> bool:
-        """Whether nothing contradicts: no decision differs that could be proved, and no command from its decision."""
+        """Whether nothing contradicts: no provable decision differs, and no sent command differs from its decision."""
         return self.different == 0 and self.strayed == 0
 
     @property
     def proved(self) -> bool:
-        """Whether every turn is proved: boats were decided for, all the same, none missing, and all that was sent."""
+        """Whether all turns are proved: own boats had decisions, all equal, none missing, and all commands match."""
         return self.holds and self.covered > 0 and not (self.unproven or self.missing or self.unfounded)
 
 
 class Prover:
     """Decides again tick by tick.
 
-    The shield remembers backups from tick to tick, so that after missing ticks its answer is only known again from the
-    next reset on, or from the next change of the fleet's boats, which makes it forget as well.
+    The shield stores backups from tick to tick. After missing ticks its answers are therefore unknown until the next
+    reset, or until the fleet's boats change, which also resets it.
     """
 
     def __init__(self, header: LogHeader) -> None:
@@ -152,7 +151,7 @@ class Prover:
         self._boats: Any = None
 
     def add(self, tick: Tick) -> None:
-        """Decide a tick again and compare; compare what was sent with what was decided."""
+        """Decide a tick again and compare; also compare sent commands with the decision."""
         proof = self.proof
         proof.ticks += 1
         if tick.number != self._last + 1:
@@ -202,12 +201,12 @@ def prove(header: LogHeader, ticks: Iterable[Tick]) -> Proof:
 
 
 def exact(value: Any) -> str:
-    """A value so that two that differ in a bit read differently."""
+    """Format a value such that values differing in a bit read differently."""
     return f"{value!r} ({value.hex()})" if isinstance(value, float) else repr(value)
 
 
 def _differing(recorded: Decisions, replayed: Decisions) -> Iterator[tuple[str, str, Any, Any]]:
-    """Boat, name of the value and the two values, for every value that differs in a bit."""
+    """Yield boat, name of the value and both values, for every value that differs in a bit."""
     one, other = recorded.filtered, replayed.filtered
     if one.relative != other.relative:
         yield "", "frame of the command", one.relative, other.relative

@@ -1,4 +1,4 @@
-"""What keeps a run in time and in order: compiling beforehand, few pauses, signals, and logs that make nobody wait."""
+"""Measures that keep a run on time and in order: compilation beforehand, priorities, signals, asynchronous logs."""
 
 from __future__ import annotations
 
@@ -29,18 +29,19 @@ from ..terminal import SafeFormatter
 from .orders import boats_of
 
 LOOP_FIRST, OTHERS_FIRST = 2, 1
-"""Real-time priorities of the loop's thread and of the runner's others, where the system allows them: before all other
-programs. A nicer program still makes the loop wait for its turn, 18 ms at the load where this makes it 0.2 ms."""
+"""Real-time priorities of the loop's thread and of the runner's others, above all other programs, where allowed.
+
+Nice values are not enough: under a load where this delays the loop by 0.2 ms, they delay it by 18 ms."""
 SWITCH_S = 0.0001
-"""How long another thread may keep the interpreter from the loop, s."""
+"""How long another thread may hold the interpreter, s."""
 ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
-"""Signals that end a run in order; the last comes when a terminal or its connection is closed."""
+"""Signals that end a run in order; SIGHUP comes when a terminal or its connection is closed."""
 MOST_LINES = 10_000
-"""Lines of the log that may wait to be written; more are dropped."""
+"""Most log lines waiting to be written; further ones are dropped."""
 
 
 def warm_up(fleet: FleetFile) -> None:
-    """Compile all that the loop runs and read its value tables, so that its first turn is as quick as any.
+    """Compile all that the loop runs and read its value tables, so that its first turn is not slower.
 
     Raises:
         TableError: a value table cannot be read.
@@ -55,7 +56,7 @@ def warm_up(fleet: FleetFile) -> None:
 
 @contextlib.contextmanager
 def undisturbed() -> Iterator[None]:
-    """Fewer pauses: no search for garbage in what was made so far, quick hand-over of threads, other programs wait."""
+    """Reduce pauses: existing objects are not garbage-collected, threads switch fast, and the process has priority."""
     interval = sys.getswitchinterval()
     gc.collect()
     gc.freeze()
@@ -70,14 +71,14 @@ def undisturbed() -> Iterator[None]:
 
 @contextlib.contextmanager
 def before_others() -> Iterator[None]:
-    """All threads of this process go before other programs, as far as the system lets them; what is started later not.
+    """Raise the priority of this process's threads above other programs, where allowed; not of threads started later.
 
-    The calling thread goes before the others of this process; where it may not, they stay behind it too. A thread that
-    has more already keeps it, and each is given back what it had.
+    The calling thread has the highest priority; if it may not be raised, the others are not raised either. Higher
+    priorities are left as they are. All are restored at the end.
     """
     own, before = threading.get_native_id(), dict[int, tuple[int, int]]()
     for task in sorted(_tasks(), key=lambda task: task != own):
-        with contextlib.suppress(OSError):  # it has ended, or this is a right that we have not
+        with contextlib.suppress(OSError):  # the thread has ended, or permission is missing
             has = os.sched_getscheduler(task), os.sched_getparam(task).sched_priority
             first = LOOP_FIRST if task == own else OTHERS_FIRST
             if has[1] < first:
@@ -89,21 +90,21 @@ def before_others() -> Iterator[None]:
         yield
     finally:
         for task, (policy, priority) in before.items():
-            for given in (policy, policy | os.SCHED_RESET_ON_FORK):  # few have the right to take the flag off
+            for given in (policy, policy | os.SCHED_RESET_ON_FORK):  # removing the flag may need permission
                 with contextlib.suppress(OSError):
                     os.sched_setscheduler(task, given, os.sched_param(priority))
                     break
 
 
 def _tasks() -> list[int]:
-    """Numbers of this process's threads, where the system tells them."""
+    """Return the ids of this process's threads, where the system lists them."""
     folder = Path("/proc/self/task")
     return [int(task.name) for task in folder.iterdir()] if folder.is_dir() else []
 
 
 @contextlib.contextmanager
 def ended_by_signals(operator: Operator) -> Iterator[None]:
-    """Ctrl-C, SIGTERM and SIGHUP end the run in order, boats stopped; a second one does not wait for that."""
+    """Let Ctrl-C, SIGTERM and SIGHUP end the run with boats stopped; a second signal interrupts at once."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -123,10 +124,10 @@ def ended_by_signals(operator: Operator) -> Iterator[None]:
 
 @contextlib.contextmanager
 def logging_aside(path: Path | None, shown: bool) -> Iterator[None]:
-    """Write the log to a file, and to standard error when ``shown``, from a thread of its own.
+    """Write the log to a file, and to standard error when ``shown``, from a separate thread.
 
-    Whatever a disk or a terminal does, logging costs the loop no time. The file is left only where something was
-    logged: warnings and failures; what happened in a run is in its black box.
+    A slow disk or terminal therefore does not delay the loop. An empty file is removed at the end. The black box, not
+    this log, records the run.
 
     Raises:
         BridgeError: the file cannot be made.
@@ -156,11 +157,11 @@ def logging_aside(path: Path | None, shown: bool) -> Iterator[None]:
             handler.close()
         with contextlib.suppress(OSError):
             if path is not None and path.stat().st_size == 0:
-                path.unlink()  # nothing had to be said
+                path.unlink()  # nothing was logged
 
 
 class _Dropping(logging.handlers.QueueHandler):
-    """Drops lines when too many wait."""
+    """Drops lines if too many wait."""
 
     def enqueue(self, record: logging.LogRecord) -> None:
         with contextlib.suppress(queue.Full):

@@ -1,4 +1,4 @@
-"""The rules over boats that something else moves: `Umpire` applies them, `Referee` hears boats and tells the game."""
+"""The game's rules for boats moved elsewhere: `Umpire` applies them, `Referee` receives positions and publishes."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ FROM_FILE = {
     "platforms": "boats.platform",
     "dt_s": "rate_hz",
 }
-"""Settings of the game that other keys of a fleet file say."""
+"""Game settings that other keys of a fleet file give."""
 CARRY_S = 1.0
-"""A boat's last fix is carried forward along its heading by this time at most, s."""
+"""Longest time for which a boat's last fix is extrapolated along its heading, s."""
 SIDES = ("blue", "red")
 
 
 def game_config(fleet: FleetFile) -> GameConfig:
-    """Settings of the game a fleet plays: the preset's, with the file's field, boats, rate and ``rules``.
+    """Return the settings of a fleet's game: the preset's, with the file's field, boats, rate and ``rules``.
 
     Raises:
         FleetFileError: no boat has an agent, the preset or a rule is unknown, or a rule contradicts another key.
@@ -49,7 +49,7 @@ def game_config(fleet: FleetFile) -> GameConfig:
 
 
 def stand_in_config(fleet: FleetFile, boats: Sequence[str]) -> GameConfig:
-    """Settings of a game for boats that play none, as `game_config`: they are one team, and nobody is the other."""
+    """Return settings as `game_config` for boats that play no game: they are one team; the other has no boats."""
     return _config(fleet, 2 * tuple(fleet.platform_of[name] for name in boats))
 
 
@@ -71,12 +71,12 @@ def _config(fleet: FleetFile, platforms: tuple[Platform, ...]) -> GameConfig:
 
 
 def player_names(fleet: FleetFile) -> tuple[str, ...]:
-    """Names of the boats that play, in the order of their agents."""
+    """Return the names of the boats that play, in the order of their agents."""
     return tuple(boat.name for boat in fleet.boats if boat.agent is not None)
 
 
 def game_obstacles(fleet: FleetFile) -> Surroundings:
-    """Obstacles of the game, and the circle of our own flag at home as ``stops``; nothing when no boat plays.
+    """Return the game's obstacles, with the circle around the own flag's home as ``stops``; empty if no boat plays.
 
     Raises:
         FleetFileError: the preset or a rule is unknown, or a rule contradicts another key.
@@ -87,24 +87,24 @@ def game_obstacles(fleet: FleetFile) -> Surroundings:
 
 
 class Umpire:
-    """Watches the boats of one game and applies the rules; moves nothing.
+    """Applies the rules to the observed boats of one game; moves nothing.
 
-    The rules are those of `BatchedMctf.follow`. The game begins when every boat has been heard of; from then on a boat
-    not heard of for ``lost_after_s`` counts as out of bounds until it is heard of again.
+    The rules are those of `BatchedMctf.follow`. The game begins once every boat was seen. From then on a boat not seen
+    for ``lost_after_s`` counts as out of bounds until it is seen again.
 
     Attributes:
         names: of the boats, in the order of their agents.
         began: whether the game has begun.
-        events: what happened at the last look, a line each.
+        events: what happened at the last call of `watch`, a line each.
 
     Raises:
-        GameError: there are not as many names as boats.
+        GameError: the number of names differs from that of boats.
     """
 
     def __init__(self, config: GameConfig, names: Sequence[str], lost_after_s: float = 5.0) -> None:
         if len(names) != config.n_boats:
             raise GameError(f"{len(names)} names for {config.n_boats} boats; name each boat of the game")
-        core = BatchedMctf(config)  # the rules are compiled now: the game's first seconds are not spent on it
+        core = BatchedMctf(config)  # compiles the rules, so that the game's first seconds are not spent on it
         seen = core.state[..., : L.SPEED + 1].copy()
         core.start_seen(seen)
         core.follow(seen, config.dt_s)
@@ -122,9 +122,9 @@ class Umpire:
         return bool(self.core.terminated[0] or self.core.truncated[0])
 
     def watch(self, contacts: Sequence[Contact], now_s: float) -> GameState:
-        """Look at the latest contact of each boat and say how the game stands; after its end it stands as it ended.
+        """Apply the rules to the latest contact of each boat and return the state of the game.
 
-        ``now_s`` is on the clock of the contacts; boats of no game are not looked at.
+        After the end the state no longer changes. ``now_s`` is on the contacts' clock; other boats are ignored.
         """
         known = {contact.boat: contact for contact in contacts}
         seen = np.array([self._seen(known.get(name), now_s) for name in self.names])
@@ -145,7 +145,7 @@ class Umpire:
         return self.state(note)
 
     def _seen(self, contact: Contact | None, now_s: float) -> tuple[float, float, float, float]:
-        """X m, y m, heading deg, speed m/s of a boat now; NaN when it is lost."""
+        """Return a boat's extrapolated x m, y m, heading deg and speed m/s; NaN if it is lost."""
         if contact is None or now_s - contact.fixed_s > self.lost_after_s:
             return (math.nan,) * 4
         (x_m, y_m), heading_rad = contact.position_m, contact.heading_rad
@@ -154,9 +154,9 @@ class Umpire:
         return *place, math.degrees(heading_rad), contact.speed_mps
 
     def state(self, note: str = "") -> GameState:
-        """How the game stands, as of the last look."""
+        """Return the state of the game as of the last call of `watch`."""
         if self.began:
-            self.core.commands(np.zeros((1, len(self.names), 2)))  # tells which boats the game drives
+            self.core.commands(np.zeros((1, len(self.names), 2)))  # updates which boats are game-controlled
         return state_of(self.core, self.names, note)
 
     def _told(self, before: Any) -> list[str]:
@@ -177,7 +177,7 @@ class Umpire:
 
 
 def state_of(core: BatchedMctf, names: Sequence[str], note: str = "") -> GameState:
-    """The state of a running game (number 0 of ``core``) under the boats' names."""
+    """Return the state of a running game (number 0 of ``core``) under the boats' names."""
     arrays = (core.is_tagged, core.has_flag, core.oob, core.on_side, core.tagging_cooldown_s, core.driven)
     rows = zip(*(array[0].tolist() for array in arrays), strict=True)
     keys = ("tagged", "has_flag", "oob", "on_side", "cooldown_s", "driven")
@@ -191,26 +191,26 @@ def state_of(core: BatchedMctf, names: Sequence[str], note: str = "") -> GameSta
 
 RATE_HZ = 10.0
 LINGER_S = 3.0
-"""How long the end of a game is told, s."""
+"""How long the end of a game is published, s."""
 Told = Callable[[GameState, Sequence[str]], None]
 """Called each time with the state of the game and what happened, a line each."""
 
 
 class Referee:
-    """Hears positions, applies the rules, publishes the state of the game. A context manager.
+    """Receives positions, applies the rules, and publishes the state of the game. A context manager.
 
-    Of each boat the contact counts of who was heard first and still speaks.
+    Of several senders for one boat, the one heard first counts while it still sends.
 
     Args:
         fleet: the file.
         clock: of all times.
-        listen: HOST:PORT to hear the feed at; None: the file's feed.referee.
+        listen: HOST:PORT to receive the feed at; None: the file's feed.referee.
         publish: HOST:PORT of further listeners, besides the file's runners.
 
     Raises:
-        FleetFileError: the file has no game, or does not say where to hear positions or whom to tell.
-        BridgeError: an address cannot be heard at.
-        ConfigError: an address is none, or the signing key cannot be read or others can read it.
+        FleetFileError: the file has no game, or lacks an address to receive positions at or to publish to.
+        BridgeError: an address cannot be listened at.
+        ConfigError: an address is malformed, or the signing key cannot be read or other users can read it.
     """
 
     def __init__(self, fleet: FleetFile, clock: Clock, listen: str | None = None, publish: Sequence[str] = ()) -> None:
@@ -230,7 +230,7 @@ class Referee:
             self._open = stack.pop_all()
 
     def contacts(self) -> Sequence[Contact]:
-        """The latest contact of each boat heard of."""
+        """Return the latest contact of each boat."""
         oldest_s = self.clock.now_s() - self._max_age_s
         found: dict[str, Contact] = {}
         for contact in self.feed.read():
@@ -240,7 +240,7 @@ class Referee:
         return tuple(found.values())
 
     def turn(self) -> GameState:
-        """Look once and tell everybody."""
+        """Apply the rules once and publish the state."""
         state = self.umpire.watch(self.contacts(), self.clock.now_s())
         self._sender.send_game(state)
         return state
@@ -248,7 +248,7 @@ class Referee:
     def run(
         self, told: Told, stopped: Callable[[], bool], rate_hz: float = RATE_HZ, limit_s: float | None = None
     ) -> str:
-        """Keep the game until it is over, stopped (asked before each look), or the time from now is up.
+        """Run until the game is over, ``stopped()`` is true (checked before each turn), or ``limit_s`` has passed.
 
         Returns:
             Why it ended: "over", "stopped" or "time".
@@ -265,12 +265,12 @@ class Referee:
                     return "over"
             elif limit_s is not None and now_s - begun_s >= limit_s:
                 return "time"
-            due_s = max(due_s + 1.0 / rate_hz, now_s)  # what was missed is not made up for
+            due_s = max(due_s + 1.0 / rate_hz, now_s)  # missed turns are skipped
             self.clock.sleep_until(due_s)
         return "stopped"
 
     def close(self) -> None:
-        """Give the sockets back; may be called again."""
+        """Close the sockets; may be called again."""
         self._open.close()
 
     def __enter__(self) -> Self:

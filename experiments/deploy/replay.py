@@ -1,4 +1,4 @@
-"""What a replay found: the proof, and on demand distances, breaches and verdicts; as numbers and text."""
+"""Result of a replay: the proof, and on demand distances and separation violations with verdicts; as data and text."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ from .proof import Difference, Proof, Prover
 from .tracks import TrackBuilder, Tracks, placed, record_of
 
 MOST_LINES = 200
-"""Lines of the log kept for the report."""
+"""Most log lines in the report."""
 MOST_ROWS = 12
-"""Rows of a table; the rest is counted."""
+"""Most rows of a table; the rest is only counted."""
 
 
 @dataclass
 class Replay:
-    """What a replay found, see `keys.REPLAY`.
+    """Result of a replay, see `keys.REPLAY`.
 
     Attributes:
         lines: warnings and errors in the log.
-        tracks: what happened; None where not asked for.
-        record: of the game, made of the tracks.
-        judged: closest distances, m, numbers of breaches and the breaches with verdicts; empty where not asked for.
+        tracks: trajectories; None if not requested.
+        record: of the game, made from the tracks.
+        judged: closest distances, m, and separation violations with counts and verdicts; empty if not requested.
     """
 
     header: LogHeader
@@ -55,17 +55,17 @@ class Replay:
 
     @property
     def proved(self) -> bool:
-        """Whether every decision of a log that is as it was written is proved; one that was killed has no end."""
+        """Whether every decision is proved and the log is unaltered; a log without a proper end can be proved."""
         return self.proof.proved and self.chain.broken == 0 and not self.damage
 
     @property
     def made_by(self) -> str:
-        """Which version wrote the log."""
+        """Version that wrote the log."""
         return f"steerclear {self.header.versions.get('steerclear', 'unknown')}, sources {self.header.sources[:8]}"
 
 
 def replay_log(log: LogReader, keep_tracks: bool) -> Replay:
-    """Decide everything in a log again; keep tracks when they are needed afterwards.
+    """Decide everything in a log again; ``keep_tracks`` also builds tracks and record.
 
     Raises:
         LogError: a part does not fit this version.
@@ -105,7 +105,7 @@ def replay_log(log: LogReader, keep_tracks: bool) -> Replay:
 
 
 def origin_of(header: LogHeader) -> list[str]:
-    """What may change a last bit between the log's program and this one, in words."""
+    """List differences between the log's program and this one that may change the last bits."""
     here = versions()
     found = [
         f"{name} {header.versions.get(name, 'none')} there, {here.get(name, 'none')} here"
@@ -122,7 +122,7 @@ def origin_of(header: LogHeader) -> list[str]:
 
 
 def judge(replay: Replay) -> None:
-    """Fill in how close own boats came to others, and what the oracle says of their breaches."""
+    """Add the own boats' closest distances and the verdicts on their separation violations."""
     tracks, record = replay.tracks, replay.record
     if tracks is None or record is None:
         return

@@ -1,7 +1,7 @@
-"""Runs on boats: checks, a black box, boats that obey; they are always left stopped.
+"""Runs on boats: checks, a black box, and steering; boats are always left stopped.
 
-`deploy` lets a policy play, `preflight` checks and drills, `sea_trial` drives the manoeuvres a boat is fitted to: all
-three are one `run_boats` with another driver.
+`deploy` lets a policy play, `preflight` checks and drills, and `sea_trial` drives the manoeuvres that models are fitted
+to. All three call `run_boats` with different drivers.
 """
 
 from __future__ import annotations
@@ -50,12 +50,12 @@ from .sea_trial import SeaTrial, longest_s
 LOG = logging.getLogger(__name__)
 
 LOOK_S = 1.5
-"""How long boats are looked at before their situation is judged, s."""
+"""How long boats are observed before their situation is judged, s."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """What was asked for, the file and its text, and what came of it."""
+    """A run: its orders, its fleet file with text, and its outcome."""
 
     orders: Orders
     surface: Surface
@@ -67,7 +67,7 @@ class Run:
 
     @classmethod
     def of(cls, orders: Orders, surface: Surface | None, operator: Operator | None) -> Run:
-        """Read the file and refuse what cannot be run; nothing is opened."""
+        """Read the file and reject what cannot be run; nothing is opened."""
         fleet, text = read_fleet(orders)
         refuse_early(fleet)
         clock = MonotonicClock(orders.speed)
@@ -75,7 +75,7 @@ class Run:
 
 
 class Boats:
-    """Boats that obey: the open session and the black box of a run."""
+    """The boats of a run, ready to be commanded: open session and black box."""
 
     def __init__(self, run: Run, session: VehicleSession, box: McapWriter) -> None:
         self.run, self.session, self._box = run, session, box
@@ -89,10 +89,10 @@ class Boats:
         plays: bool = False,
         begins: Callable[[ControlLoop], None] = lambda loop: None,
     ) -> ControlLoop:
-        """Steer by nominal commands, each through the shield, until the time is over or somebody ends it.
+        """Steer by nominal commands, filtered by the shield, until the time is over or somebody ends the run.
 
-        Sinks get every tick, as the black box and the surface's do; ``plays``: the referee's state of the game counts;
-        ``begins`` is given the loop before its first turn.
+        Sinks get every tick, as do the black box and the user interface. ``plays``: use the referee's state of the
+        game. ``begins`` is called with the loop before its first turn.
         """
         run = self.run
         with contextlib.ExitStack() as stack:
@@ -116,18 +116,18 @@ def run_boats(
     opened: Callable[[VehicleSession], Sequence[Check]] = lambda session: (),
     elsewhere: Sequence[str] = (),
 ) -> Outcome:
-    """Open the boats, run the checks, and drive when they allow it.
+    """Open the boats, run the checks, and drive if they allow it.
 
     Args:
-        run: what was asked for.
+        run: the run.
         policy: name of what steers, for the log.
-        drive: steers boats that obey; None: no boat is moved.
-        opened: called with the open session before anything is sent; its further checks.
-        elsewhere: kinds of checks made elsewhere that may be accepted too.
+        drive: steers the boats; None: no boat is moved.
+        opened: called with the open session before anything is sent; returns further checks.
+        elsewhere: kinds of checks made elsewhere that may also be accepted.
 
     Raises:
-        ConfigError: a name to accept is no check's.
-        BridgeError: a port is taken, a boat does not answer or refuses; boats heard until then are left stopped.
+        ConfigError: a name to accept is not a check.
+        BridgeError: a port is taken, or a boat does not answer or refuses; boats connected by then are left stopped.
     """
     orders, fleet, outcome = run.orders, run.fleet, run.outcome
     session = VehicleSession(fleet, orders.boat, run.clock, tlog=orders.tlog, begun_unix_s=orders.begun_unix_s)
@@ -136,7 +136,7 @@ def run_boats(
             checks = [*checks_of(session, orders.minutes or LONGEST_MINUTES), *opened(session)]
             known = [*checks, *(Check(kind, lambda: CheckResult("", False, "")) for kind in elsewhere)]
             validate_accepted([name for name in orders.accept if name.split(":")[0] not in elsewhere], known)
-            session.connect(orders.connect_s)  # the first packets to boats; whatever needs none was refused by now
+            session.connect(orders.connect_s)  # sends the first packets to boats
             outcome.checks = run_checks(checks, run.surface.shown)
             outcome.refused = not_passed(outcome.checks, orders.accept)
             accepted = [one for one in outcome.checks if not one.passed and one not in outcome.refused]
@@ -158,7 +158,7 @@ def run_boats(
 
 
 def checks_of(session: VehicleSession, minutes: float) -> list[Check]:
-    """Checks that move no boat, for a run so long, in the order to run: the log's, the links', the situation's."""
+    """Return the checks that move no boat, in order: log, links, situation; ``minutes`` is the run's length."""
     fleet = session.fleet
     disk = Check("disk", lambda: check_disk(fleet.log_dir, boats=len(fleet.boats), minutes=minutes))
     mavlink = {name: link for name, link in session.links.items() if isinstance(link, MavlinkLink)}
@@ -169,7 +169,7 @@ def checks_of(session: VehicleSession, minutes: float) -> list[Check]:
 
     @cache
     def tracker() -> Tracker:
-        """What is known of all boats after watching them for a while, when first asked for."""
+        """Return a tracker that has observed all boats for a while; runs once, at the first call."""
         tracker, due_s = Tracker(fleet, session.links), session.clock.now_s()
         for _ in range(math.ceil(LOOK_S / fleet.dt_s)):
             due_s += fleet.dt_s
@@ -188,12 +188,12 @@ def deploy(orders: Orders, surface: Surface | None = None, operator: Operator | 
     """Run boats by a policy; without an operator only signals end the run.
 
     Returns:
-        What came of it; ``refused`` is not empty when checks forbade the start.
+        The outcome; ``refused`` is not empty if checks prevented the start.
 
     Raises:
         FleetFileError: the file cannot be used; nothing was opened.
-        PolicyError: there is no such policy, or it does not start; nothing was opened.
-        BridgeError: a port is taken, a boat does not answer or refuses; boats heard until then are left stopped.
+        PolicyError: the policy does not exist or does not start; nothing was opened.
+        BridgeError: a port is taken, or a boat does not answer or refuses; boats connected by then are left stopped.
     """
     run = Run.of(orders, surface, operator)
     fleet = run.fleet
@@ -226,7 +226,7 @@ def deploy(orders: Orders, surface: Surface | None = None, operator: Operator | 
 
 
 def _policy(fleet: FleetFile, orders: Orders, clock: Clock) -> PolicyProcess | MoosNominal:
-    """Where nominal commands come from: a process of ours, or the boats' own communities."""
+    """Return the source of nominal commands: a policy process, or the boats' MOOS communities."""
     boats = tuple(entry.name for entry in fleet.commanded(orders.boat))
     if orders.policy == MOOS_POLICY:
         return MoosNominal(fleet, boats)
@@ -237,26 +237,26 @@ def _policy(fleet: FleetFile, orders: Orders, clock: Clock) -> PolicyProcess | M
 def preflight(
     orders: Orders, surface: Surface | None = None, operator: Operator | None = None, *, drill: bool = True
 ) -> Outcome:
-    """Run all checks, and the drill, which moves boats, when they allow it; boats are left stopped.
+    """Run all checks, then the drill, which moves boats, if they allow it; boats are left stopped.
 
-    What was found by a drill is kept. The orders' policy is not needed.
+    The results are stored if a drill was requested. The orders' policy is not used.
 
     Raises:
         FleetFileError: the file cannot be used; nothing was opened.
-        BridgeError: a port is taken, a boat does not answer or refuses, or the result cannot be kept.
+        BridgeError: a port is taken, a boat does not answer or refuses, or the result cannot be stored.
     """
     run = Run.of(orders, surface, operator)
     warm_up(run.fleet)
     outcome = run_boats(run, "drill", _drill if drill else None, elsewhere=(*DRILLED, "drill"))
     outcome.ended = run.operator.ended
-    if drill:  # else an earlier drill stays in force
+    if drill:  # else an earlier drill remains valid
         refused = [result.name for result in outcome.refused]
         outcome.log = keep(run.fleet, run.text, orders.boat, outcome.checks, refused)
     return outcome
 
 
 def _drill(boats: Boats) -> None:
-    """Drive one boat after the other a short way, and judge what was seen."""
+    """Drive one boat after the other a short way, and run the drill's checks."""
     run = boats.run
     drill = Drill(run.fleet, tuple(boats.session.links))
     missed = Missed(drill)
@@ -278,14 +278,15 @@ def sea_trial(
     speed_mps: float | None = None,
     tell: Callable[[str], None] = lambda text: None,
 ) -> tuple[Outcome, SeaTrial | None]:
-    """Run the manoeuvres of a sea trial when the checks allow it; boats are left stopped.
+    """Run the manoeuvres of a sea trial if the checks allow it; boats are left stopped.
 
-    ``only`` is the one boat to drive, else all of the process are, one after the other, and ``speed_mps`` the highest
-    speed told, else top speed. ``tell`` is told which manoeuvre begins. The orders' policy is not needed.
+    ``only`` names the one boat to drive; None: all of the process, one after the other. ``speed_mps`` is the highest
+    commanded speed; None: top speed. ``tell`` is called with each manoeuvre that begins. The orders' policy is not
+    used.
 
     Raises:
         FleetFileError: the file cannot be used, or has no such boat; nothing was opened.
-        BridgeError: a port is taken, a boat does not answer or refuses.
+        BridgeError: a port is taken, or a boat does not answer or refuses.
     """
     run = Run.of(orders, surface, operator)
     names = tuple(entry.name for entry in run.fleet.commanded(orders.boat))

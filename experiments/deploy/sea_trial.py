@@ -1,8 +1,7 @@
-"""`SeaTrial`: the manoeuvres by which ships are proved (IMO MSC.137(76)), one boat after the other, behind the shield.
+"""`SeaTrial`: standard ship manoeuvring trials (IMO MSC.137(76)), one boat after the other, filtered by the shield.
 
-Speed steps, right angles, a zig-zag, turning circles and stops, each begun from the middle of the geofence towards its
-widest water and broken off before the edge. It stands where a policy stands; the black box keeps what came of it, and
-`steerclear fit` reads that.
+Speed steps, right angles, a zig-zag, turning circles and stops. Each begins near the middle of the geofence along its
+longer side, and is aborted before the edge. It takes the place of a policy. `steerclear fit` reads the black box.
 """
 
 from __future__ import annotations
@@ -20,13 +19,13 @@ from steerclear.shield.commands import Commands
 from steerclear.shield.jit import Array
 
 HOME_M, HOME_SIDE, HOME_S = 6.0, 0.2, 30.0
-"""A boat is home within so many m of the middle, or that share of the shorter side; after so long it begins anyway."""
+"""A boat is home within this distance, m, or share of the shorter side, of the middle; after this time it begins."""
 STEADY_S = 5.0
 EDGE_M, LOOK_S = 4.0, 2.5
-"""A manoeuvre is broken off when the boat would be so near to the geofence within so long."""
+"""A manoeuvre is aborted if the boat would come this near to the geofence, m, within this time, s."""
 ZIGZAG_DEG, ZIGZAG_LEGS = 20.0, 5
 CIRCLE_DEG, CARROT_DEG = 400.0, 75.0
-"""A turning circle is told as a heading that stays so far ahead of the boat's."""
+"""A turning circle is commanded as a heading this far ahead of the boat's."""
 HOME_SHARE = 0.6
 
 Wanted = tuple[float, float]
@@ -34,7 +33,7 @@ Wanted = tuple[float, float]
 
 @dataclass
 class Leg:
-    """Where a manoeuvre stands: the heading it was begun on, deg turned since, clockwise, and zig-zag legs done."""
+    """State of a manoeuvre: its initial heading, deg turned since, clockwise, and zig-zag legs done."""
 
     base_deg: float
     turned_deg: float = 0.0
@@ -42,7 +41,7 @@ class Leg:
 
 
 Steer = Callable[[Leg, float, float], Wanted | None]
-"""Speed share and heading, deg, from the leg, the time in it, s, and the boat's heading, deg; None: it is done."""
+"""Returns speed share and heading, deg, from leg, time in it, s, and the boat's heading, deg; None: it is done."""
 
 
 def _steps(leg: Leg, into_s: float, heading_deg: float) -> Wanted | None:
@@ -89,7 +88,7 @@ MANOEUVRES: tuple[tuple[str, float, Steer], ...] = (
     ("right angle to starboard at full speed", 1.0, partial(_right_angle, 1.0, 1.0)),
     ("stop from full speed again", 1.0, _stop),
 )
-"""Name, share of the trial's speed it is begun at, and how it is steered."""
+"""Name, share of the trial's speed it begins at, and steering function."""
 
 
 class SeaTrial:
@@ -97,14 +96,14 @@ class SeaTrial:
 
     Args:
         fleet: the file.
-        boats: to drive, in order; all others of the process lie still.
-        speed_mps: highest speed told; None: each boat's top speed.
-        tell: is told what begins.
-        operator: ends the run once the trial is done; None: nobody does.
+        boats: to drive, in order; the process's other boats stay at rest.
+        speed_mps: highest commanded speed; None: each boat's top speed.
+        tell: called with each manoeuvre that begins.
+        operator: ends the run after the trial; None: nobody does.
 
     Attributes:
-        broken_off: names of manoeuvres that the geofence ended early, by boat.
-        changed: turns whose commands the shield changed, and all turns, by boat.
+        broken_off: manoeuvres that the geofence ended early, by boat.
+        changed: turns in which the shield changed the command, and all turns, by boat.
     """
 
     def __init__(
@@ -127,7 +126,7 @@ class SeaTrial:
 
     @property
     def done(self) -> bool:
-        """Whether all boats went through all manoeuvres."""
+        """Whether all boats completed all manoeuvres."""
         return not self._left
 
     def offer(self, snapshot: Snapshot) -> None:
@@ -144,7 +143,7 @@ class SeaTrial:
         return Answer() if self._commands is None else Answer(self._commands, 0.0)
 
     def take(self, tick: Tick) -> None:
-        """See `TickSink`: counts turns in which the shield gave way, and ends the run once the trial is done."""
+        """See `TickSink`: count interventions, and end the run after the trial."""
         if self.done and self._operator is not None and not self._operator.ended:
             self._operator.end("the trial is done")
         boat = self._left[0][0] if self._left else ""
@@ -153,10 +152,10 @@ class SeaTrial:
             self.changed[boat][1] += 1
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Do nothing."""
 
     def _wanted(self, row: Array, now_s: float) -> Wanted:
-        """Speed, m/s, and heading, rad, of the boat whose turn it is; its row: x m, y m, heading deg, speed m/s."""
+        """Return speed, m/s, and heading, rad, of the boat whose turn it is; row: x m, y m, heading deg, speed m/s."""
         boat, manoeuvre, share, steer = self._left[0]
         place, heading_deg, speed_mps = row[:2], float(row[2]), float(row[3])
         top_mps = min(self._fleet.platform_of[boat].max_speed_mps, self._speed_mps or math.inf)
@@ -168,7 +167,7 @@ class SeaTrial:
                 return HOME_SHARE * top_mps, math.atan2(-away[0], -away[1])
             self._phase, self._since_s = "steady", now_s
             self._tell(f"{boat}: {manoeuvre}")
-            along = 90.0 if self._sides[0] >= self._sides[1] else 0.0  # the longer side, by the smaller turn
+            along = 90.0 if self._sides[0] >= self._sides[1] else 0.0  # along the longer side, with the smaller turn
             off = abs(math.remainder(along - heading_deg, 360.0))
             self._leg = Leg(along if off <= 90.0 else along + 180.0)
         if self._phase == "steady":
@@ -191,5 +190,5 @@ class SeaTrial:
 
 
 def longest_s(boats: int) -> float:
-    """More than a trial of so many boats takes, s."""
+    """Return an upper bound of the duration of a trial of so many boats, s."""
     return boats * len(MANOEUVRES) * (HOME_S + STEADY_S + 60.0)

@@ -1,4 +1,4 @@
-"""`Worker`: one run of the policy's process, everything the system keeps for it, and the messages to and from it."""
+"""`Worker`: a process for the policy, its resources, and the messages to and from it."""
 
 from __future__ import annotations
 
@@ -22,39 +22,39 @@ from steerclear.shield.foreign import plain_text
 from ..entries.sandbox import OVER, READY, Limits, end_group, end_marked, is_stopped
 
 HEAD = struct.Struct("!i")
-"""Of a message, as `multiprocessing.connection` writes it, which is what the process has at its end."""
+"""Header of a message, as `multiprocessing.connection`, used at the other end, writes it."""
 MAX_BYTES = 1 << 20
-"""A longer message is nothing either side sends."""
+"""Longest valid message."""
 GONE = "the other end is gone"
 SUPERVISE = """import sys
 sys.path[:] = filter(None, sys.path)
 from steerclear.experiments.entries.sandbox import main
 sys.exit(main(sys.argv[1:]))
 """
-"""What the process runs: the supervisor, without the working directory's own modules in its way."""
+"""Code of the supervisor process; modules in the working directory do not shadow others."""
 PART = "steerclear.experiments.deploy.player"
 DEPLOY_LIMITS = Limits(written_bytes=None, output_bytes=None, gives_way=True, network=True)
-"""Limits of a policy that may play for days."""
+"""Limits of a policy; without totals, since it may play for days."""
 TAIL_BYTES = 4096
-"""How much of what the policy prints is kept."""
+"""How much of the policy's printed output is stored."""
 SUPERVISOR_S, GONE_S = 5.0, 10.0
-"""How long a supervisor may take to end what it watches, and any process to be gone once it was ended."""
+"""Time a supervisor has to end its child, and any ended process has to disappear, s."""
 SINGLE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
 class Broken(Exception):
-    """The other end is gone, or sent what is no message."""
+    """The other end is gone, or sent something invalid."""
 
 
 class Worker:
-    """A started process, in a session of its own: keys for the runner do not reach it. Only waits where it says so.
+    """A running process in a session of its own, so the runner's keys do not reach it. Only documented methods wait.
 
-    What runs in it is forked, watched and limited by `entries.sandbox`, and ends with all it started. Its temporary
-    files, such as an unpacked submission, have a folder of their own that goes with it. What the policy prints is read
-    a little at each turn, so that one that floods only slows itself.
+    `entries.sandbox` forks, watches and limits what runs in it, and ends it with all it started. A folder of its own
+    holds its temporary files, such as an unpacked submission, and is removed with it. Printed output is read a little
+    each turn, so a policy that prints too much slows only itself.
 
     Args:
-        orders: its first message; empty: none yet.
+        orders: first message; empty: none yet.
         part: module whose ``serve`` runs there.
         limits: of what runs there.
         preload: modules to import beforehand.
@@ -102,37 +102,37 @@ class Worker:
 
     @property
     def is_gone(self) -> bool:
-        """Whether the system has taken the process."""
+        """Whether the process has ended."""
         return self._process.poll() is not None
 
     @property
     def prints_too_much(self) -> bool:
-        """Whether more was printed than the limits allow."""
+        """Whether it printed more than the limits allow."""
         return self.limits.output_bytes is not None and self._printed > self.limits.output_bytes
 
     def messages(self) -> list[bytes]:
-        """Whole messages that have come; also reads what the process printed.
+        """Return the complete messages received; also read printed output.
 
         Raises:
-            Broken: the process is gone and all it sent was read, it stopped the one that watches it, or what it sends
-                is no message.
+            Broken: the process is gone and all its messages were read, it stopped its supervisor, or it sent
+                something invalid.
         """
         self._read_output()
         if is_stopped(self._process.pid):
             raise Broken("it stopped the process that watches it; its process was ended")
-        gone = self.is_gone  # asked first: a process it started may hold the pipe open
+        gone = self.is_gone  # before reading: a process it started may hold the pipe open
         messages = self._read()
         if gone and not messages:
             raise Broken(GONE)
         return messages
 
     def send(self, message: bytes) -> None:
-        """Send a message after those before it, or raise `Broken`: the process is gone."""
+        """Queue a message and send what fits, or raise `Broken` if the process is gone."""
         self._unsent += HEAD.pack(len(message)) + message
         self.flush()
 
     def flush(self) -> None:
-        """Go on sending what did not fit into the pipe before, or raise `Broken`: the process is gone."""
+        """Send queued data that did not fit into the pipe before, or raise `Broken` if the process is gone."""
         try:
             while self._unsent:
                 self._unsent = self._unsent[os.write(self._orders, self._unsent) :]
@@ -142,14 +142,14 @@ class Worker:
             raise Broken(GONE) from None
 
     def await_turn(self, timeout_s: float) -> None:
-        """Wait until there is something to read, or the time is over."""
+        """Wait until there is something to read, at most ``timeout_s``."""
         _poll(timeout_s, self._answers, *([] if self._output.closed else [self._output.fileno()]))
 
     def is_fresh(self, patience_s: float) -> bool:
-        """Wait until what ran there is gone and the process is ready for the next; False: it is of no more use."""
+        """Wait until what ran there is gone and the process is ready for the next; return False if it is unusable."""
         end_s = time.monotonic() + patience_s
         while not _poll(0.02, self._notes) and time.monotonic() < end_s:
-            self._read_output()  # what it printed last must not keep it
+            self._read_output()  # pending output must not block it
         self._read_output()
         self._tail, self._printed = b"", 0
         with contextlib.suppress(Broken):
@@ -157,12 +157,12 @@ class Worker:
         return False
 
     def output(self) -> str:
-        """The end of what the process printed."""
+        """Return the end of the printed output."""
         return plain_text(self._tail.decode(errors="replace"), TAIL_BYTES, lines=True)
 
     def epitaph(self, otherwise: str) -> str:
-        """How the process ended, with its last words; ``otherwise`` when it has not."""
-        for _ in range(200 if otherwise == GONE else 3):  # its pipes close a moment before it is gone
+        """Return how the process ended, with its last output line; ``otherwise`` if it has not ended."""
+        for _ in range(200 if otherwise == GONE else 3):  # its pipes close a moment before it ends
             if self.is_gone:
                 break
             time.sleep(0.001)
@@ -180,9 +180,9 @@ class Worker:
         return how + (f', its last words: "{last[0][:160]}"' if last else "")
 
     def end(self) -> None:
-        """End the process and all it started; give everything back. May be called again.
+        """End the process and all it started, and release everything. May be called again.
 
-        The closed pipes tell the supervisor to end what it watches; one that does not is ended after a while.
+        Closed pipes tell the supervisor to end its child; if it does not, a thread ends all after a while.
         """
         if self._cleaner is None:
             self._close_pipes()
@@ -191,18 +191,18 @@ class Worker:
             self._cleaner.start()
 
     def wait(self, timeout_s: float) -> None:
-        """Wait until the system has taken it, and its files are gone."""
+        """Wait until the process has ended and its files are removed."""
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(timeout=timeout_s)
         if self._cleaner is not None and self._cleaner is not threading.current_thread():
             self._cleaner.join(timeout_s)
 
     def _clean(self) -> None:
-        """Remove its folder once it is gone; that may take long, and the loop must not."""
+        """Wait for the end and remove the folder; in a thread, because it may take long."""
         with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(timeout=SUPERVISOR_S)
         end_group(self._process.pid)
-        end_marked(self._folder)  # where code ended its supervisor, what it started has nobody else to end it
+        end_marked(self._folder)  # processes whose supervisor was killed have nobody else to end them
         self.wait(GONE_S)
         shutil.rmtree(self._folder, ignore_errors=True)
 
@@ -216,7 +216,7 @@ class Worker:
         return ""
 
     def _read(self) -> list[bytes]:
-        """Whole messages that have come, of no more than a message's bytes at a time."""
+        """Return complete messages, reading at most about one message's size at a time."""
         ended, unread, messages = False, self._unread, []
         with contextlib.suppress(BlockingIOError):
             while len(unread) <= MAX_BYTES and not ended:
@@ -243,7 +243,7 @@ class Worker:
 
 
 def _poll(timeout_s: float, *descriptors: int) -> bool:
-    """Wait for something to read; whether there is."""
+    """Wait for something to read; return whether there is."""
     poll = select.poll()
     for descriptor in descriptors:
         poll.register(descriptor, select.POLLIN)

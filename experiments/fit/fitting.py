@@ -1,4 +1,4 @@
-"""From runs to a platform file: least squares, held-out errors and the margin that covers them, per kind of boat."""
+"""Fitting of platform files to runs: least squares, held-out errors and the margin that covers them, per kind."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ from .models import MODELS, Model, Seen, distance_m, errors_of
 from .runs import STEP_S, FitError, Run
 
 EVERY, AHEAD, PICKED = 10, 60, 6
-"""Windows begin every so many steps and reach so far ahead; each so many steps one is looked at."""
+"""Steps between windows, their length, and the interval of the compared steps."""
 WEIGHTS = np.array([1.0, 1.0, 0.02, 0.5])
-"""Of x, y (1/m), heading (1/deg) and speed (s/m)."""
+"""Weights of x, y (1/m), heading (1/deg) and speed (s/m)."""
 SOFT = 0.5
-"""Residuals beyond this count less: one bad stretch must not bend the whole."""
+"""Scale of the robust loss: larger weighted residuals count less, so that outliers do not dominate the fit."""
 DELAYS_S = np.arange(0.025, 0.8, 0.05)
 BEGUN, MOST, HELD = 8, 50, 12
-"""Evaluations (each with its derivatives) of every first guess, of the best of them, and of fits to held-out runs."""
+"""Evaluations (each with its derivatives) of every first guess, of the best of them, and of fits for held-out runs."""
 FOLDS = 3
-"""Runs of each kind are dealt out to so many parts; each part is predicted by a fit to the others."""
+"""Cross-validation folds within each kind of run; a fit to the other folds predicts each."""
 AHEAD_S = (1.0, 3.0, 6.0)
 COVERED = 0.99
 JUDGED_EVERY = 3
 """Steps between the moments from which a run is predicted."""
 DIGITS, CHOSEN_BY = 4, 0.9
 WORST_M = 3.0
-"""Held-out errors 3 s ahead beyond this say that the log is not of one boat obeying these commands."""
+"""If the median held-out error 3 s ahead exceeds this, the log is not of one boat obeying these commands, m."""
 
 
 @dataclass(frozen=True)
 class Fit:
-    """A fitted model, its numbers, and the mean square of the weighted residuals."""
+    """A fitted model, its parameters, and the mean square of the weighted residuals."""
 
     model: Model
     vector: Array
@@ -45,12 +45,12 @@ class Fit:
 
     @property
     def delay_s(self) -> float:
-        """From command to effect, s."""
+        """Delay from command to effect, s."""
         return float(self.vector[-1])
 
 
 def residuals(model: Model, vector: Array, runs: Sequence[Run], top_mps: float) -> Array:
-    """Weighted differences of all runs, flat."""
+    """Return the weighted residuals of all runs, flat."""
     params = model.platform(vector, "fitted", top_mps).pack()
     errors = (errors_of(params, run, float(vector[-1]), EVERY, AHEAD)[:, PICKED - 1 :: PICKED] for run in runs)
     flat = np.concatenate([(error * WEIGHTS).ravel() for error in errors])
@@ -58,9 +58,9 @@ def residuals(model: Model, vector: Array, runs: Sequence[Run], top_mps: float) 
 
 
 def fit_model(model: Model, runs: Sequence[Run], top_mps: float) -> Fit:
-    """The best of the fits from several first guesses: each is begun, the best is gone on with.
+    """Return the best fit from several first guesses; only the best start is optimised to the end.
 
-    In between the delay that suits best is looked for: a descent gets stuck where commands come in steps.
+    Between the two stages the delay is chosen from a grid: with stepwise commands a descent gets stuck in it.
     """
     best = min((_least(model, runs, top_mps, start, BEGUN) for start in model.starts()), key=lambda fit: fit.cost)
     for delay_s in DELAYS_S:
@@ -106,25 +106,25 @@ class Judged:
     held_out: Sequence[bool]
 
     def errors_of(self, column: int, chosen: Callable[[int], bool]) -> Array:
-        """Errors at one of `AHEAD_S` of the runs whose numbers are chosen, m."""
+        """Return errors at one of `AHEAD_S` for the chosen run numbers, m."""
         parts = [errors[:, column] for n, errors in enumerate(self.errors_m) if chosen(n)]
         joined = np.concatenate([np.zeros(0), *parts])
         return np.asarray(joined[np.isfinite(joined)])
 
     def quantile_m(self, column: int, share: float) -> float:
-        """Quantile of the errors at one of `AHEAD_S`: the next larger one, of all errors when none is held out."""
+        """Return an upper quantile of the held-out errors at one of `AHEAD_S`, m; of all errors if none is held out."""
         errors = self.errors_of(column, lambda n: self.held_out[n])
         errors = errors if len(errors) else self.errors_of(column, lambda n: True)
         rank = min(len(errors), int(np.ceil(share * (len(errors) + 1))))
         return float(np.sort(errors)[rank - 1]) if len(errors) else float("nan")
 
     def median_of_kind(self, kind: str, column: int = 1) -> float:
-        """Median error of the runs of a kind, m; NaN: there is none."""
+        """Return the median error of runs of a kind, m; NaN without any."""
         errors = self.errors_of(column, lambda n: self.runs[n].kind == kind)
         return float(np.median(errors)) if len(errors) else float("nan")
 
     def margin(self) -> tuple[float, float]:
-        """Error 1 s ahead, m, and its growth, m/s, which together cover `COVERED` of the errors at `AHEAD_S`."""
+        """Return error 1 s ahead, m, and growth, m/s, that together cover the `COVERED` quantiles at `AHEAD_S`."""
         bounds = [self.quantile_m(column, COVERED) for column in range(len(AHEAD_S))]
         known = [(at, bound) for at, bound in zip(AHEAD_S, bounds, strict=True) if np.isfinite(bound)]
         begin = known[0][1] if known else 0.0
@@ -133,11 +133,11 @@ class Judged:
 
 
 def judge(model: Model, runs: Sequence[Run], seen: Seen) -> Judged:
-    """Fit a model to all runs, and predict each run by a fit to the others of its kind."""
+    """Fit a model to all runs, and predict each run by a fit that leaves out its fold."""
     around, top_mps = model.around(seen), seen.top_mps
     fit = fit_model(around, runs, top_mps)
     kinds, dealt, parts = Counter(run.kind for run in runs), Counter[str](), []
-    for run in runs:  # -1: the only one of its kind, which is never left out
+    for run in runs:  # -1: the only run of its kind, which is never held out
         parts.append(dealt[run.kind] % FOLDS if kinds[run.kind] > 1 else -1)
         dealt[run.kind] += 1
     fits = {-1: fit}
@@ -150,7 +150,7 @@ def judge(model: Model, runs: Sequence[Run], seen: Seen) -> Judged:
 
 
 def _at_times(params: Array, run: Run, delay_s: float) -> Array:
-    """Errors of places at `AHEAD_S`, (windows, 3), m; of a run shorter than one of them NaN there."""
+    """Return position errors at `AHEAD_S`, (windows, 3), m; NaN where the run is too short."""
     steps = [round(at / STEP_S) for at in AHEAD_S]
     columns = [distance_m(errors_of(params, run, delay_s, JUDGED_EVERY, ahead)[:, -1]) for ahead in steps]
     found = np.full((len(columns[0]), len(columns)), np.nan)
@@ -160,7 +160,7 @@ def _at_times(params: Array, run: Run, delay_s: float) -> Array:
 
 
 def fit_runs(runs: Sequence[Run], kinds: Sequence[str], tell: Callable[[str], None]) -> dict[str, Judged]:
-    """Fit each kind of boat, of `MODELS`, to the runs of one boat; ``tell`` is told which."""
+    """Fit the chosen kinds of `MODELS` to the runs of one boat; ``tell`` is called with each kind."""
     seen, found = Seen.of(runs), {}
     for kind in kinds:
         tell(kind)
@@ -169,15 +169,15 @@ def fit_runs(runs: Sequence[Run], kinds: Sequence[str], tell: Callable[[str], No
 
 
 def best_of(found: dict[str, Judged]) -> str:
-    """The kind whose errors, 90th percentiles at all times ahead, are the smallest together."""
+    """Return the kind with the smallest sum of 90th-percentile errors over `AHEAD_S`."""
     return min(found, key=lambda kind: float(np.nansum([found[kind].quantile_m(c, CHOSEN_BY) for c in range(3)])))
 
 
 def platform_file(judged: Judged, name: str) -> PlatformFile:
-    """The file of a fitted boat.
+    """Return the platform file of a fit.
 
     Raises:
-        FitError: the log cannot be predicted, or what was fitted is no boat that can be steered.
+        FitError: no model predicts the log, or the fitted platform cannot be steered.
     """
     worst = judged.quantile_m(1, 0.5)
     if worst > WORST_M:
@@ -194,7 +194,7 @@ def platform_file(judged: Judged, name: str) -> PlatformFile:
 
 
 def measured_of(judged: Judged) -> dict[str, float]:
-    """The section ``measured`` of a file."""
+    """Return the section ``measured`` of a platform file."""
     error, growth = judged.margin()
     held_out = [out and len(errors) > 0 for out, errors in zip(judged.held_out, judged.errors_m, strict=True)]
     values = {
@@ -210,7 +210,7 @@ def measured_of(judged: Judged) -> dict[str, float]:
 
 
 def results_of(found: dict[str, Judged], chosen: str, file: PlatformFile) -> dict[str, Any]:
-    """What ``--json`` holds."""
+    """Return the content of ``--json``."""
     judged = found[chosen]
     kinds = [run.kind for run in judged.runs]
     return {

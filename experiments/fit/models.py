@@ -1,4 +1,4 @@
-"""The models that are tried, each a vector of numbers that least squares changes, and how each predicts a run."""
+"""Models to fit, each a parameter vector for least squares, and their predictions of a run."""
 
 from __future__ import annotations
 
@@ -42,19 +42,19 @@ _USV = (
     DELAY,
 )
 HELD_S, HELD_MPS, FASTER_MPS = 2.0, 0.06, 0.25
-"""A speed held for so long, s, within so much, m/s, although told to go faster by so much is the top speed."""
+"""A boat at top speed holds it this long, s, within this range, m/s, though commanded this much faster, m/s."""
 
 SLOW_SHARE = 0.2
-"""Of top speed: below it a boat has hardly any way."""
+"""Share of top speed below which a boat counts as nearly at rest."""
 
 Bound = tuple[str, float, float, float]
 
 
 @dataclass(frozen=True)
 class Seen:
-    """What a boat did at its hardest in its runs: m/s, m/s2, deg/s, deg/s2; ``rest_rate_dps`` with hardly any way.
+    """Extremes that a boat reached in its runs, m/s, m/s2, deg/s, deg/s2; ``rest_rate_dps``: turn rate nearly at rest.
 
-    A boat that was never seen to turn without way is not believed to.
+    A boat never seen turning at rest is assumed hardly able to.
     """
 
     top_mps: float
@@ -66,7 +66,7 @@ class Seen:
 
     @classmethod
     def of(cls, runs: Sequence[Run]) -> Seen:
-        """Of some runs: highest values, single odd ones left out."""
+        """Return the extremes of some runs, outliers left out."""
         speed = np.concatenate([run.seen[:, 3] for run in runs])
         told = max(float(run.told[:, 0].max()) for run in runs)
         gains = np.concatenate([_slope(run.seen[:, 3], 0.5) for run in runs])
@@ -85,7 +85,7 @@ class Seen:
 
 
 def _held(run: Run) -> float:
-    """Speed, m/s, that a boat held although told to go faster: it can do no more; inf: it never did."""
+    """Return a run's speed held although commanded faster, m/s, which is top speed; inf if there was none."""
     over = round(HELD_S / STEP_S)
     if len(run.seen) <= over:
         return np.inf
@@ -97,7 +97,7 @@ def _held(run: Run) -> float:
 
 
 def _slope(values: Array, over_s: float) -> Array:
-    """Change per second over a time."""
+    """Return the change per second over an interval."""
     apart = max(1, round(over_s / STEP_S))
     return np.asarray((values[apart:] - values[:-apart]) / (apart * STEP_S))
 
@@ -126,8 +126,8 @@ class Model:
         return np.array([bound[3] for bound in self.bounds])
 
     def around(self, seen: Seen) -> Model:
-        """The model with first guesses and bounds from what was seen of the boat."""
-        twice = 2.0 if self.kind == "usv" else 1.0  # such a hull stores the mean of old and new speed: half as quick
+        """Return the model with first guesses and bounds from what was seen of the boat."""
+        twice = 2.0 if self.kind == "usv" else 1.0  # a usv stores the mean of old and new speed: it accelerates half
         told = {
             "max_acc": (twice * seen.acc_mps2, 0.5, 4.0),
             "max_dec": (twice * seen.dec_mps2, 0.5, 4.0),
@@ -146,15 +146,15 @@ class Model:
         return replace(self, bounds=tuple(bounds), guesses=guesses)
 
     def starts(self) -> list[Array]:
-        """First guesses."""
+        """Return the first guesses."""
         return [np.array([guess.get(name, value) for name, value, *_ in self.bounds]) for guess in ({}, *self.guesses)]
 
     def values(self, vector: Array) -> dict[str, float]:
-        """Named values of a vector."""
+        """Return a vector's values by name."""
         return {name: float(value) for (name, *_), value in zip(self.bounds, vector, strict=True)}
 
     def platform(self, vector: Array, name: str, top_mps: float, proved: bool = False) -> Platform:
-        """The platform of a vector; while fitting it need not be a boat.
+        """Return the platform of a vector; unless ``proved`` it need not be steerable.
 
         Raises:
             PlatformError: ``proved``, and it cannot be steered.
@@ -212,10 +212,10 @@ def _relative(heading_deg: float, told_deg: float) -> float:
 
 @kernel
 def predict(params: Array, thrust: Array, seen: Array, told: Array, every: int, ahead: int, out: Array) -> None:
-    """Fill ``out`` (windows, ahead, 4): x, y, unwrapped heading, speed predicted 1, 2, ... steps on.
+    """Fill ``out`` (windows, ahead, 4) with predicted x, y, unwrapped heading and speed, 1, 2, ... steps ahead.
 
-    Before each step the model is put where the boat was seen (k, 5), its controllers' memory kept; window w begins at
-    step w * every of the run. Memory begins with the thrust (1,), percent; ``told`` (k, 2) works in each step.
+    Before each step the model is set to the seen state (k, 5) and keeps its controllers' memory. Window w begins at
+    step w * every. The memory starts with the thrust (1,), percent. ``told`` (k, 2) are the commands in effect.
     """
     row, window = np.zeros(L.N_STATE), np.zeros(L.N_STATE)
     row[L.THRUST] = thrust[0]
@@ -237,14 +237,14 @@ def predict(params: Array, thrust: Array, seen: Array, told: Array, every: int, 
 
 
 def delayed(run: Run, delay_s: float) -> Array:
-    """Commands that work in each step when they take so long; fractions of a step are mixed."""
+    """Return the commands in effect in each step after a delay; fractions of a step are interpolated."""
     steps = np.arange(len(run.told))
     at = steps - delay_s / STEP_S
     return np.column_stack([np.interp(at, steps, column) for column in run.told.T])
 
 
 def errors_of(params: Array, run: Run, delay_s: float, every: int, ahead: int) -> Array:
-    """Foretold less seen, (windows, ahead, 4): x m, y m, heading deg, speed m/s."""
+    """Return predicted minus seen, (windows, ahead, 4): x m, y m, heading deg, speed m/s."""
     count = max(0, (len(run.seen) - 1 - ahead) // every + 1)
     out = np.zeros((count, ahead, 4))
     if count:
@@ -256,5 +256,5 @@ def errors_of(params: Array, run: Run, delay_s: float, every: int, ahead: int) -
 
 
 def distance_m(errors: Array) -> Array:
-    """Distances, m, of errors (..., 4)."""
+    """Return the distances, m, of errors (..., 4)."""
     return np.hypot(errors[..., 0], errors[..., 1])

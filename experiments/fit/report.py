@@ -1,4 +1,4 @@
-"""What a fit says to the user: a picture, what the boat does, and what the shield then promises."""
+"""Report of a fit: a picture, the boat's behaviour, and what the shield then accounts for."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from .models import errors_of
 from .runs import STEP_S
 
 SEPARATION_M, MUCH_M, LATE_S = 2.5, 1.0, 0.4
-"""A usual separation; an error at 3 s and a delay beyond these are remarked on."""
+"""Usual separation, m; an error at 3 s, m, and a delay, s, above which the report adds a remark."""
 LONGEST_S = 120.0
 AHEAD_STEPS, EVERY_STEPS, RUNS = 60, 30, 4
-"""What the picture shows of runs: predictions so long, one each so many steps, and how many runs."""
+"""Picture of runs: length of predictions, steps between them, and number of runs."""
 
 
 def draw(judged: Judged, name: str, path: Path) -> None:
-    """Write a picture of a fit: some runs as seen and as predicted, and the errors over the time ahead.
+    """Draw a fit: some runs as seen and as predicted, and the errors over the time ahead.
 
     Raises:
         OSError: it cannot be written.
@@ -65,7 +65,7 @@ def _label(axis: Any, title: str, x: str, y: str) -> None:
 
 
 def _telling(judged: Judged) -> list[int]:
-    """Runs to show: of each kind the one predicted worst, then others."""
+    """Return the runs to show: of each kind the worst predicted, then others."""
     worst = [float(np.nanmax(errors[:, 1], initial=0.0)) for errors in judged.errors_m]
     order = sorted(range(len(worst)), key=lambda n: -worst[n])
     first = list({judged.runs[n].kind: n for n in reversed(order)}.values())
@@ -73,7 +73,7 @@ def _telling(judged: Judged) -> list[int]:
 
 
 def about_the_boat(platform: Platform) -> list[str]:
-    """How the boat behaves in its own model, in sentences."""
+    """Describe how the boat behaves in its own model, in sentences."""
     top, dt_s = platform.max_speed_mps, 0.1
     params, row = cruise(platform)
     stop_s = speed_up_s = turn_s = fastest = 0.0
@@ -98,7 +98,7 @@ def about_the_boat(platform: Platform) -> list[str]:
 
 
 def promise(file: PlatformFile) -> list[str]:
-    """What the shield then keeps, and what to do where that is little."""
+    """Describe what the shield accounts for, and what to do where errors are large."""
     measured = file.measured
     if not measured:
         return ["Nothing was measured of it: fit it to a log, which tells delay and model-error margin."]

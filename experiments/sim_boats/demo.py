@@ -1,4 +1,4 @@
-"""The fleet file that comes with the package, and boats that are not quite what their platforms say."""
+"""The packaged fleet file, and boats that differ from their declared platforms."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import Gains, Platform
 
 KEPT = ("name", "kind", "max_speed_mps", "thrust_map", "max_thrust", "max_rudder", "speed_gain", "speed_pid")
-"""What a boat has whatever it is: its top speed and the scales that its other numbers are in."""
+"""Unchanged platform fields: names, top speed and the scales of the other values."""
 LARGEST = 0.9
 
 
 def off_platform(platform: Platform, share: float, boat: str, seed: int) -> Platform:
-    """The platform with each parameter larger or smaller by that share.
+    """Return the platform with each parameter increased or decreased by a share.
 
     Args:
         platform: as declared.
-        share: 0.2 makes each 20 % more or less.
+        share: 0.2 changes each by 20 %.
         boat: its name; every boat draws its own signs.
         seed: of the draw.
 
     Raises:
-        ConfigError: the share is not one.
-        PlatformError: what comes of it is no boat that can be steered.
+        ConfigError: the share is out of range.
+        PlatformError: the resulting boat cannot be steered.
     """
     if not 0.0 <= share <= LARGEST:
         raise ConfigError(f"boats cannot be off by {share:g}; give a share from 0 to {LARGEST:g}, such as 0.2")
@@ -53,17 +53,17 @@ def off_platform(platform: Platform, share: float, boat: str, seed: int) -> Plat
 NAME = "demo_fleet.yaml"
 LINKS = ("mavlink", "moos")
 MOOS_PORTS = (9001, 9002, 9003)
-"""Ports of our boats' MOOSDBs in the file of boats that run MOOS."""
+"""Ports of the own boats' MOOSDBs in the file for MOOS."""
 
 
 def demo_text(link: str = "mavlink") -> str:
-    """The file's text, to begin one's own with.
+    """Return the packaged file's text, as a template.
 
     Args:
-        link: what our boats run, one of `LINKS`.
+        link: what the own boats run, one of `LINKS`.
 
     Raises:
-        ConfigError: another.
+        ConfigError: another link.
     """
     text = resources.files("steerclear.experiments").joinpath("templates", NAME).read_text(encoding="utf-8")
     if link not in LINKS:
@@ -76,5 +76,5 @@ def demo_text(link: str = "mavlink") -> str:
 
 
 def demo_fleet(link: str = "mavlink") -> FleetFile:
-    """The file, read; its relative paths start from the present folder."""
+    """Return the parsed packaged file; relative paths start from the current folder."""
     return parse_fleet(demo_text(link), NAME, Path.cwd())

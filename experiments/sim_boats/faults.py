@@ -1,4 +1,4 @@
-"""Faults of simulated boats: one table of kinds, switched on and off while boats run, or planned for a moment.
+"""Faults of simulated boats: a table of kinds, started and ended at run time or planned.
 
 A planned fault is written ``BOAT:KIND@TIME[+DURATION][,OPTION=VALUE...]``.
 """
@@ -25,21 +25,21 @@ if TYPE_CHECKING:
     from .fleet import SimFleet
 
 Change = Callable[[Snapshot, float], Snapshot]
-"""A fault of what the autopilot knows of itself: the truth and the time in, what it believes out."""
+"""A sensor fault: maps the true state and the time to what the autopilot measures."""
 
 
 @dataclass(frozen=True)
 class Fault:
-    """One that acts now; which parts it has depends on its kind.
+    """An active fault; its kind determines which parts it has.
 
     Attributes:
         ends_s: when it ends by itself; inf: when it is cleared.
-        down, up: what becomes of packets to and from the commander.
-        change: what becomes of the autopilot's knowledge.
+        down, up: effect on packets to and from the commander.
+        change: effect on the autopilot's measurements.
         dark: the autopilot is off.
         hidden: the position feed leaves the boat out.
-        feed_late_s: age of what the position feed says of the boat.
-        compass_off_rad: error of the compass, clockwise.
+        feed_late_s: delay of the boat's positions in the feed.
+        compass_off_rad: compass error, clockwise.
     """
 
     ends_s: float = math.inf
@@ -53,13 +53,13 @@ class Fault:
 
 
 class Faults:
-    """The faults of one boat: of its autopilot and of its radio to (down) and from (up) the commander.
+    """Faults of one boat: of its autopilot and of its radio to (down) and from (up) the commander.
 
     Attributes:
-        active: by kind, those that act now.
+        active: active faults by kind.
         is_dark: whether the autopilot is off.
         is_hidden: whether the position feed leaves the boat out.
-        feed_late_s: age of what the position feed says of the boat, s.
+        feed_late_s: delay of the boat's positions in the feed, s.
     """
 
     def __init__(
@@ -86,25 +86,25 @@ class Faults:
             self._combine()
 
     def stop(self, kind: str | None = None) -> None:
-        """End a fault, or all."""
+        """End one fault, or all."""
         for name in list(self.active) if kind is None else [kind]:
             self.active.pop(name, None)
         self._combine()
 
     def tick(self, now_s: float) -> None:
-        """End those whose time is over."""
+        """End faults whose time is over."""
         for name in [name for name, fault in self.active.items() if now_s >= fault.ends_s]:
             self.stop(name)
 
     def misled(self, order: Order) -> Order:
-        """What the hull does under an order, the compass being what it is."""
+        """Return the order that the hull follows, given the compass error."""
         off = sum(fault.compass_off_rad for fault in self.active.values())
         if off == 0.0 or not isinstance(order, Steer):
             return order
         return Steer((order.heading_rad - off) % (2.0 * math.pi), order.speed_mps)
 
     def sensed(self, truth: Snapshot, now_s: float) -> Snapshot:
-        """What the autopilot believes."""
+        """Return what the autopilot measures."""
         for fault in self.active.values():
             truth = truth if fault.change is None else fault.change(truth, now_s)
         return truth
@@ -118,10 +118,10 @@ class Faults:
 
 
 def check_kind(kind: str) -> None:
-    """See that there is such a fault.
+    """Check that a fault kind exists.
 
     Raises:
-        ConfigError: there is none.
+        ConfigError: it does not.
     """
     if kind not in KINDS:
         near = difflib.get_close_matches(kind, KINDS, n=1)
@@ -236,11 +236,11 @@ KINDS: dict[str, Callable[..., Fault | None]] = {
         *(_duplicate, _corrupt, _restart, _power_off, _mode, _disarm),
     )
 }
-"""Makers of faults by kind: what each does is its docstring, as the page of the boats shows it."""
+"""Fault factories by kind. Their docstrings are shown in the documentation of the boats."""
 
 
 def faults_page() -> str:
-    """The table of faults for the documentation, in Markdown."""
+    """Return the documentation's table of faults, in Markdown."""
     rows = [f"| `{kind}` | {make.__doc__} |" for kind, make in KINDS.items()]
     return "\n".join(["| kind | what happens |", "|---|---|", *rows])
 
@@ -252,7 +252,7 @@ _FORM = re.compile(
 
 @dataclass(frozen=True)
 class Incident:
-    """One fault to come: of which boat, its kind (see `KINDS`) and options, at what simulated time, for how long, s."""
+    """A planned fault: boat, kind (see `KINDS`) and options, simulated start time and duration, s."""
 
     boat: str
     kind: str
@@ -262,10 +262,10 @@ class Incident:
 
 
 def parse_incident(text: str) -> Incident:
-    """One planned fault, such as ``blue_1:jump@60+10,distance_m=30``.
+    """Parse a planned fault, such as ``blue_1:jump@60+10,distance_m=30``.
 
     Raises:
-        ConfigError: it is of another form, or of an unknown kind.
+        ConfigError: it is malformed, or of an unknown kind.
     """
     found = _FORM.fullmatch(text.strip())
     if found is None:
@@ -281,10 +281,10 @@ def parse_incident(text: str) -> Incident:
 
 
 class Plan:
-    """Faults to come, in order of time.
+    """Planned faults in order of time.
 
     Raises:
-        ConfigError: a boat that is not simulated.
+        ConfigError: a boat is not simulated.
     """
 
     def __init__(self, incidents: Iterable[Incident], fleet: SimFleet) -> None:
@@ -294,10 +294,10 @@ class Plan:
             fleet.boat(incident.boat)
 
     def look(self) -> list[Incident]:
-        """Begin those whose time has come, and say which.
+        """Start the faults that are due and return them.
 
         Raises:
-            ConfigError: an option the fault does not have.
+            ConfigError: the fault has no such option.
         """
         begun = []
         while self._waiting and self._waiting[0].at_s <= self._fleet.time_s:

@@ -1,4 +1,4 @@
-"""The game among simulated boats as it truly stands: who plays it, where they start, what scripted opponents do."""
+"""The true game among simulated boats: players, starts and scripted opponents."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ _SEEN = (L.X, L.Y, L.HEADING, L.SPEED)
 
 
 def playing(boats: Sequence[SimBoat]) -> list[int]:
-    """Numbers of the boats that play, blue first; none when the teams are not of one size."""
+    """Return the numbers of the playing boats, blue first; empty if the teams differ in size."""
     blue, red = ([i for i, boat in enumerate(boats) if boat.team == team] for team in (0, 1))
     return [*blue, *red] if len(blue) == len(red) else []
 
 
 def game_of(boats: Sequence[SimBoat], preset: str | GameConfig, rules: Mapping[str, Any]) -> GameConfig | None:
-    """The game these boats play, by a preset or as given; None when the teams are not of one size.
+    """Return the game these boats play, from a preset or as given; None if the teams differ in size.
 
     Raises:
-        ConfigError: the preset or a rule is unknown, or a boat has a policy and no game to play it in.
+        ConfigError: the preset or a rule is unknown, or a boat has a policy but no game.
     """
     players = playing(boats)
     stray = [boat.name for i, boat in enumerate(boats) if boat.policy and i not in players]
@@ -51,15 +51,15 @@ def game_of(boats: Sequence[SimBoat], preset: str | GameConfig, rules: Mapping[s
 
 
 def start_places(boats: Sequence[SimBoat], config: GameConfig | None, random_seed: int | None) -> list[Place]:
-    """Start of each boat: its own place, else the game's fixed one for teams of that size, or a random one.
+    """Return each boat's start: its own, else the game's fixed one for that team size, or a random one.
 
     Args:
         boats: all boats.
         config: the game the boats play, if any.
-        random_seed: draw places apart from each other, from this seed; None: the fixed ones.
+        random_seed: draw starts with distance between them, from this seed; None: the fixed ones.
 
     Raises:
-        ConfigError: there is no room for random places, or a boat outside the game has no place of its own.
+        ConfigError: there is no room for random starts, or a boat outside the teams has no start of its own.
     """
     largest = max(1, *(sum(boat.team == team for boat in boats) for team in (0, 1)))
     game = config or GameConfig.preset("aamas2024", team_size=largest)
@@ -71,7 +71,7 @@ def start_places(boats: Sequence[SimBoat], config: GameConfig | None, random_see
     free = iter(rows[: game.team_size].tolist()), iter(rows[game.team_size :].tolist())
     places = []
     for boat in boats:
-        own = next(free[boat.team], None) if boat.team in (0, 1) else None  # whoever lies elsewhere leaves it free
+        own = next(free[boat.team], None) if boat.team in (0, 1) else None  # used up even if the boat has its own start
         x_m, y_m, heading_deg = boat.start or own or (math.nan,) * 3
         if math.isnan(x_m):
             raise ConfigError(f"boat {boat.name!r} is in no team; give it a start (x m, y m, heading deg)")
@@ -80,7 +80,7 @@ def start_places(boats: Sequence[SimBoat], config: GameConfig | None, random_see
 
 
 class Game:
-    """Rules and scripted players (``players``: number to policy) over boats that something else moves, blue first.
+    """Rules and scripted players (``players``: number to policy) for boats moved elsewhere, blue first.
 
     Raises:
         ConfigError: a policy is not a scripted one.
@@ -99,14 +99,14 @@ class Game:
                     self._runners.append(PolicyRunner(policies.make(name), self.env, ids))
 
     def start(self, states: Array) -> None:
-        """Begin with the boats where they are, (n, N_STATE)."""
+        """Begin with the boats' current states (n, N_STATE)."""
         self.core.start_seen(states[None, :, _SEEN])
         self.core.state[0] = states
         for number, runner in enumerate(self._runners):
             runner.reset(self.env, 2 * self._seed + number)
 
     def orders(self) -> dict[int, Bear]:
-        """What the scripted players' boats do next, driven home where the game does that."""
+        """Return the next orders of the scripted players' boats; the game itself steers tagged boats and the like."""
         if not self._runners:
             return {}
         nominal = np.zeros((1, self.core.n_boats, 2))
@@ -117,6 +117,6 @@ class Game:
         return {i: Bear(float(decided[i, 1]), float(decided[i, 0])) for i in self.players}
 
     def follow(self, states: Array) -> None:
-        """The boats have moved by one step: apply the rules."""
+        """Apply the rules after the boats have moved by one step."""
         self.core.follow(states[None, :, _SEEN], STEP_S)
-        self.core.state[0] = states  # with the autopilots' memory, which the rules do not need and the judge does
+        self.core.state[0] = states  # with controller memory, which the avoidability analysis needs

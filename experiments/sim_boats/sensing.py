@@ -1,4 +1,4 @@
-"""What a boat's sensors say of its hull, with the noise that was measured, and the radio to and from its commander."""
+"""Sensors of a boat, with measured noise, and the radio to and from its commander."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from .settings import RadioSettings
 
 _HEADING_RUNNING_RAD, _HEADING_AT_REST_RAD = math.radians(0.3), math.radians(1.7)
 _SPREAD = np.array([0.06, 0.06, 0.035, 0.035])
-"""Of x, y m and their rates m/s; the heading's depends on the speed."""
+"""Standard deviation of x, y in m and their rates in m/s; the heading's depends on the speed."""
 _KEPT = np.exp(-STEP_S / np.array([10.0, 10.0, 1.0, 1.0, 3.0]))
-"""Errors wander: each forgets itself over its own time."""
+"""Autocorrelation per step of the five errors, with time constants in s."""
 _TURN_RATE_RADS = 0.003
 
 
@@ -48,7 +48,7 @@ class Snapshot:
     has_fix: bool = True
 
     def moved_to(self, frame: FieldFrame, x_m: float, y_m: float) -> Snapshot:
-        """The same at another place of the field, m."""
+        """Return the snapshot moved to another position in the field, m."""
         latitude, longitude = frame.to_geodetic_deg(x_m, y_m)
         return replace(self, x_m=x_m, y_m=y_m, latitude_deg=latitude, longitude_deg=longitude)
 
@@ -61,7 +61,7 @@ class Sensors:
         self._errors = random.standard_normal(5)
 
     def sense(self, hull: Hull, time_s: float) -> Snapshot:
-        """What they say of the hull now."""
+        """Return the readings for the hull's current state."""
         (x, y), velocity, heading, rate = hull.position_m, hull.velocity_mps, hull.heading_rad, hull.turn_rate_rads
         if self._noise > 0.0:
             dx, dy, dvx, dvy, turn = self._drawn(hull)
@@ -80,11 +80,11 @@ class Sensors:
 
 
 Bend = Callable[[bytes], list[tuple[float, bytes]]]
-"""A fault: what becomes of a packet, as (further delay s, bytes)."""
+"""A radio fault: returns what a packet becomes, as (extra delay s, bytes) of each copy."""
 
 
 class Radio:
-    """Holds packets until they arrive; ``bends``: faults that act now, in order; ``lost``: packets dropped so far."""
+    """Delays packets until they arrive; ``bends``: active faults, in order; ``lost``: packets dropped so far."""
 
     def __init__(self, settings: RadioSettings, random: np.random.Generator) -> None:
         self._settings, self._random = settings, random
@@ -94,7 +94,7 @@ class Radio:
         self.lost = 0
 
     def put(self, packet: bytes, now_s: float) -> None:
-        """A packet leaves."""
+        """Transmit a packet."""
         lost = self._settings.loss > 0.0 and self._random.random() < self._settings.loss
         copies = [] if lost else [(0.0, packet)]
         for bend in self.bends:
@@ -106,6 +106,6 @@ class Radio:
             heapq.heappush(self._waiting, (now_s + self._settings.delay_s + late + jitter_s, self._number, data))
 
     def take(self, now_s: float) -> Iterator[bytes]:
-        """Packets that have arrived by now."""
+        """Yield packets that have arrived by now."""
         while self._waiting and self._waiting[0][0] <= now_s + 1e-9:
             yield heapq.heappop(self._waiting)[2]

@@ -1,4 +1,4 @@
-"""Links of simulated boats: the runner's own wires and framing with their ends changed, and who is behind which."""
+"""Links of simulated boats: the runner's transport and framing with the ends swapped, and the boats behind each."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from .moos import LOOPBACK
 
 FREE_PORT = f"udpout:{LOOPBACK}:0"
 OTHER_END = {"udpin": "udpout", "udpout": "udpin", "tcp": "tcpin", "tcpin": "tcp"}
-"""What a boat opens at an address of the runner's side, by its kind."""
+"""What a boat opens for each kind of address on the runner's side."""
 MOST_PEERS = 8
-"""A boat that listens answers those heard last."""
+"""A listening boat answers at most this many peers, those heard last."""
 REDIAL_S, DIAL_S = 0.5, 0.2
 
 
 def near(address: str, allow_remote: bool) -> str:
-    """HOST:PORT of a listener, which must be on this machine without ``allow_remote``.
+    """Return HOST:PORT of a listener, which must be on this machine without ``allow_remote``.
 
     Raises:
-        ConfigError: it is elsewhere, or of another form.
+        ConfigError: it is elsewhere, or malformed.
     """
     host, port = socket_address(address)
     return f"{_near_host(host, address, allow_remote)}:{port}"
@@ -46,7 +46,7 @@ def _near_host(host: str, address: str, allow_remote: bool) -> str:
 
 
 class BoatWire:
-    """The boats' end of one link, never blocking; ``address``: what the runner's side opens, with the port chosen.
+    """The boats' end of one link; never blocks. ``address`` is what the runner opens, with the chosen port.
 
     Raises:
         ConfigError: it cannot be opened.
@@ -57,7 +57,7 @@ class BoatWire:
         self._framers: dict[Peer, Framer] = {}
         self._dial_s = 0.0
         self.aboard: list[Boat] = []
-        if address.kind != "tcpin":  # a boat that dials tries again and again
+        if address.kind != "tcpin":  # a boat that connects keeps trying
             try:
                 self._wire.open()
             except LinkError as error:
@@ -66,11 +66,11 @@ class BoatWire:
         self.address = str(Address(address.kind, address.host, self._wire.port if listens else address.number))
 
     def fileno(self) -> int:
-        """What to wait on; -1: it is not open."""
+        """Return the descriptor to wait on; -1: not open."""
         return self._wire.fileno()
 
     def read(self) -> Iterator[bytes]:
-        """Whole frames that have come in."""
+        """Yield complete frames received."""
         if self._wire.fileno() < 0 and time.monotonic() >= self._dial_s:
             self._dial_s = time.monotonic() + REDIAL_S
             with contextlib.suppress(LinkError):
@@ -79,20 +79,20 @@ class BoatWire:
             while (received := self._wire.receive()) is not None:
                 data, peer = received
                 framer = self._framers.pop(peer, None) or Framer(self._wire.datagrams)
-                self._framers[peer] = framer  # the latest heard comes last
+                self._framers[peer] = framer  # the latest peer is last
                 while len(self._framers) > MOST_PEERS:
                     del self._framers[next(iter(self._framers))]
                 yield from framer.feed(data)
-        except OSError:  # the other end is gone; another may come, or be dialled
+        except OSError:  # the other end is gone; another may connect
             self._framers.clear()
 
     def write(self, packet: bytes) -> None:
-        """Send to whoever is there; what cannot be sent is lost."""
+        """Send to all known peers; what cannot be sent is lost."""
         for peer in list(self._framers) if self._wire.many else (None,):
             self._wire.send(packet, peer)
 
     def close(self) -> None:
-        """Give the socket back."""
+        """Close the socket."""
         self._wire.close()
         self._dial_s = float("inf")
 
@@ -100,7 +100,7 @@ class BoatWire:
 class Ports:
     """The wires of all boats, and the address to open for each.
 
-    Boats of one address share its wire, but each calls over UDP from a port of its own.
+    Boats at one address share its wire, except that each boat sending to the runner's UDP port has its own socket.
     """
 
     def __init__(self, allow_remote: bool) -> None:
@@ -131,11 +131,11 @@ class Ports:
         wire.aboard.append(boat)
 
     def sockets(self) -> list[int]:
-        """Descriptors to wait on."""
+        """Return the descriptors to wait on."""
         return [number for wire in self._wires if (number := wire.fileno()) >= 0]
 
     def receive(self, now_s: float) -> None:
-        """Hand what came in to the boats it is for."""
+        """Deliver received packets to the addressed boats."""
         for wire in self._wires:
             for packet in wire.read():
                 target = self._target_of(packet)
@@ -144,15 +144,15 @@ class Ports:
                         boat.hear(packet, now_s)
 
     def close(self) -> None:
-        """Give the sockets back."""
+        """Close the sockets."""
         for wire in self._wires:
             wire.close()
 
     def _target_of(self, packet: bytes) -> int:
-        """System that a whole frame is for; 0: all, or it cannot be read, which each boat finds out."""
+        """Return the addressed system of a frame; 0: all, or not decodable, which each boat checks itself."""
         try:
             return int(getattr(self._reader.decode(bytearray(packet)), "target_system", 0))
-        except Exception:  # a decoder that trips over hostile bytes must not end the boats
+        except Exception:  # a decoder error on hostile bytes must not stop the boats
             return 0
 
     def _open(self, address: str) -> BoatWire:

@@ -1,7 +1,7 @@
-"""Behaviour cloning over options: which option a demonstrator follows is learned from what it saw; numpy only.
+"""Behaviour cloning over options: a network learns which option a demonstrator follows; numpy only.
 
-Pomerleau (1989): supervised learning of a demonstrator's choices. Here the choices are Crowley-BU-LL's options, so what
-is learned is when to do what; how it is done stays written by hand.
+Supervised learning of a demonstrator's choices (Pomerleau 1989). The choices are Crowley-BU-LL's options: when to use
+an option is learned, how to carry it out is hand-written.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ HELD_OUT = 0.2
 
 
 class CloningTraining(Training):
-    """Games of the scripted demonstrator, and a network that chooses as it does; seconds, so nothing is resumed."""
+    """Trains a network on choices of the scripted demonstrator; takes seconds, so it cannot be resumed."""
 
     def __init__(self, config: Config, folder: Path, resume: bool = False) -> None:
         super().__init__(config, folder)
         self.total = config.games
 
     def run(self, notice: Notice = lambda done, words: None) -> None:
-        """Play, learn, write."""
+        """Play the demonstrations, fit, and write weights and curve."""
         rows = self._played(notice)
         about = {"demonstrations": "scripted demonstrator", "rows": len(rows)}
         chooser, curve = fitted(rows, self.config.options, self.config.seed, about)
@@ -41,7 +41,7 @@ class CloningTraining(Training):
         notice(self.decisions, f"agrees in {curve[-1]['agrees']:.0%} of held-out choices")
 
     def _played(self, notice: Any) -> list[dict[str, Any]]:
-        """Rows of the scripted demonstrator's games."""
+        """Return the rows of the demonstrator's games."""
         rows: list[dict[str, Any]] = []
         opponents = self.config.stages[0].opponents
         for game in range(self.total):
@@ -51,7 +51,7 @@ class CloningTraining(Training):
 
 
 def demonstrated(config: Config, opponent: str, seed: int) -> list[dict[str, Any]]:
-    """Rows of one game of the scripted demonstrator."""
+    """Return the rows of one game of the scripted demonstrator."""
     rules = core_of(config, 1, seed).config
     env = MctfEnv(rules, action_kind="continuous")
     observations, infos = env.reset(seed=seed)
@@ -68,7 +68,7 @@ def demonstrated(config: Config, opponent: str, seed: int) -> list[dict[str, Any
 def fitted(
     rows: list[dict[str, Any]], options: CloningOptions, seed: int, card: dict[str, Any]
 ) -> tuple[Chooser, list[dict[str, Any]]]:
-    """A chooser fitted to rows, and its curve: cross-entropy with Adam, a fifth of the rows held out."""
+    """Fit a chooser by cross-entropy with Adam, a fifth of the rows held out; return it and its curve."""
     names = Chooser.columns(rows[0]) if rows else []
     seen = np.array([[float(row[name]) for name in names] for row in rows])
     chosen = np.array([OPTION_NAMES.index(row["option"]) for row in rows])
@@ -91,7 +91,7 @@ def fitted(
 
 
 class _Adam:
-    """Kingma and Ba (2015), in place."""
+    """Adam (Kingma and Ba 2015), in place."""
 
     def __init__(self, parameters: list[np.ndarray], rate: float) -> None:
         self._parameters, self._rate, self._steps = parameters, rate, 0
@@ -99,7 +99,7 @@ class _Adam:
         self._second = [np.zeros_like(one) for one in parameters]
 
     def step(self, gradients: list[np.ndarray]) -> None:
-        """Go one step down."""
+        """Apply one descent step."""
         self._steps += 1
         scale = self._rate * np.sqrt(1.0 - 0.999**self._steps) / (1.0 - 0.9**self._steps)
         for value, first, second, gradient in zip(self._parameters, self._first, self._second, gradients, strict=True):

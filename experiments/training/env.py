@@ -1,4 +1,4 @@
-"""`TrainEnv`: the games of a training as a vector environment of Stable-Baselines3, stage after stage."""
+"""`TrainEnv`: the games of a training as a vector environment of Stable-Baselines3, one stage at a time."""
 
 from __future__ import annotations
 
@@ -27,35 +27,35 @@ from .rewards import WeightedSum
 
 
 def core_of(config: Config, games: int, seed: int, stage: Stage | None = None) -> BatchedMctf:
-    """So many games by a config's rules, a stage's or those of evaluations, starts drawn from the seed."""
+    """Return games by the rules of a stage, or of evaluations; ``seed`` draws their starts."""
     return BatchedMctf(config.game(stage), n_games=games, seed=seed)
 
 
 def shield_of(config: Config, core: BatchedMctf, team: str = "blue", stage: Stage | None = None) -> Any:
-    """The shield of a config for some games, of a stage or of evaluations."""
+    """Return a config's shield for the games of a stage, or of evaluations."""
     settings = ShieldConfig.of(**{**facts_of_games(core).settings(), **config.shield_of(stage)})
     return games_shield(core, settings, team=team, threads=config.shield_threads)
 
 
 def pool_of(config: Config, stage: Stage) -> Pool:
-    """The opponents of a stage."""
+    """Return the opponents of a stage."""
     return Pool(stage, config.league, config.seed, config.entrants_every)
 
 
 def set_tags(core: BatchedMctf, stage: Stage) -> None:
-    """Let tags succeed as often as a stage says."""
+    """Set the games' tag probability to the stage's, or to the rules' if it has none."""
     chance = core.config.tag_probability if stage.tag_probability is None else stage.tag_probability
     core.rules = share(core.rules._replace(tag_probability=float(chance)))
 
 
 class AskedShield:
-    """The command filter of a batch, asked in the first game step of a decision and every so many after it.
+    """Calls a batch's command filter in the first game step of a decision and every ``every`` steps after it.
 
-    Asked seldom it costs less and guarantees nothing in between, where what it said is held as a course and speed:
-    then it is a teacher only. Evaluations ask in every game step.
+    In between, the filtered command is held as course and speed, with no guarantee: the shield then only teaches.
+    Evaluations filter in every game step.
 
     Attributes:
-        spent_s: time it was asked for, s.
+        spent_s: time spent in the filter, s.
     """
 
     def __init__(self, batch: TeamBatch, every: int) -> None:
@@ -64,7 +64,7 @@ class AskedShield:
         batch._filter = self
 
     def __call__(self, core: Any, commands: Array) -> Array:
-        """Commands (B, n, 2) to obey."""
+        """Return the filtered commands (B, n, 2)."""
         began = time.perf_counter()
         heading_deg = core.state[:, self._boats, L.HEADING]
         if self.moved % self._every == 0:
@@ -81,17 +81,17 @@ class AskedShield:
 
 
 class TrainEnv(MctfVecEnv):
-    """Every blue boat of every game is a learner; opponents, rewards, shield and rules are those of the stage.
+    """Every blue boat of every game is a learner; opponents, rewards, shield and rules are the stage's.
 
-    Where networks are told places or each place has its own, observations end in the boat's place, one-hot. Where
-    nobody of the team holds the flag the network ``first`` decides, if there is one. What the learner chose there
-    changes nothing, so that what it learns from it is zero on average.
+    Unless the network's roles are shared, observations end in the boat's place in the team, one-hot. With ``first``,
+    that network decides while no teammate holds the flag. The learner's actions then have no effect, so their expected
+    gradient is zero.
 
     Attributes:
-        batch: the games of the stage under way.
+        batch: games of the current stage.
         stage: its number.
-        spent_s: time in the games, s, shield included.
-        first: that network, told who holds the flag; None: the learner always decides.
+        spent_s: time spent in the games, s, shield included.
+        first: that network, set up to see who holds the flag; None: the learner always decides.
     """
 
     def __init__(self, config: Config, first: Network | None = None) -> None:
@@ -127,7 +127,7 @@ class TrainEnv(MctfVecEnv):
         return batch
 
     def _check_stages(self) -> None:
-        """Build every pool and reward once, so that what is missing is found before long work."""
+        """Build every pool and reward once, so that errors show before the training starts."""
         seen = core_of(self.config, 1, 0).observation_high
         for stage in self.config.stages:
             pool_of(self.config, stage)
@@ -142,7 +142,7 @@ class TrainEnv(MctfVecEnv):
             Pool(Stage(opponents=(name,)), self.config.league, 0)
 
     def enter(self, number: int) -> None:
-        """Go to a stage, in games of its own where its rules or shield are others; `begin` starts them."""
+        """Switch to a stage, with new games if its rules or shield differ; `begin` starts them."""
         before, stage = self.config.stages[self.stage], self.config.stages[number]
         self.stage = number
         same_shield = self.config.shield_of(before) == self.config.shield_of(stage)
@@ -152,9 +152,9 @@ class TrainEnv(MctfVecEnv):
             self.batch = self._games(number)
 
     def begin(self, seed: int) -> Any:
-        """Start all games of the stage; the observations.
+        """Start all games of the stage and return the observations.
 
-        Clocks are put forward by random times, so that games do not all end in the same step.
+        Clocks are advanced by random times, so that games do not all end in the same step.
         """
         self.play_as_stage_says()
         self.batch._seed = seed
@@ -166,7 +166,7 @@ class TrainEnv(MctfVecEnv):
         return seen
 
     def play_as_stage_says(self) -> None:
-        """Let tags, shield and rewards of the games be those of the stage."""
+        """Apply the stage's tag probability, shield and rewards to the games."""
         stage, batch = self.config.stages[self.stage], self.batch
         set_tags(batch.core, stage)
         batch.shield, batch._filter = self._guard if stage.shielded else (None, None)
@@ -174,11 +174,11 @@ class TrainEnv(MctfVecEnv):
         batch.reward.begin(batch, np.ones(batch.core.n_games, np.bool_))
 
     def reset(self) -> Any:
-        """As `MctfVecEnv.reset`."""
+        """Reset as `MctfVecEnv.reset`, with places added."""
         return self._placed(super().reset())
 
     def decide(self, actions: Any) -> Stepped:
-        """A decision of all learners, held for the config's interval."""
+        """Play one decision of all learners, held for the config's interval."""
         began = time.perf_counter()
         if self._guard[1] is not None:
             self._guard[1].moved = 0
@@ -191,7 +191,7 @@ class TrainEnv(MctfVecEnv):
         return out
 
     def step_wait(self) -> Any:
-        """As `MctfVecEnv.step_wait`."""
+        """Step as `MctfVecEnv.step_wait`, with places added."""
         out = self.decide(self._actions)
         began, done = time.perf_counter(), out.terminated | out.truncated
         infos = self._infos(out, done)
@@ -211,12 +211,12 @@ class TrainEnv(MctfVecEnv):
         return np.where(first.held(seen), actions, first.outputs(seen, places).argmax(axis=1))
 
     def ended(self) -> list[dict[str, float]]:
-        """Totals of games that have ended since the last call; hits and interventions are all its boats' together."""
+        """Return totals of games ended since the last call; hits and interventions are summed over the team."""
         games, self._ended = self._ended, []
         return games
 
     def taken(self) -> dict[str, float]:
-        """Time spent since the last call, s: simulator with opponents and rewards, and shield."""
+        """Return time spent since the last call, s: simulator with opponents and rewards; and shield."""
         shield_s = 0.0
         if self._guard[1] is not None:
             shield_s, self._guard[1].spent_s = self._guard[1].spent_s, 0.0
@@ -224,7 +224,7 @@ class TrainEnv(MctfVecEnv):
         return {"simulator_s": games_s - shield_s, "shield_s": shield_s}
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """The arrays of games, counts, rewards, shield and opponents that go on from decision to decision, live."""
+        """Return the live arrays that persist between decisions: games, counts, rewards, shield and opponents."""
         batch = self.batch
         found = dict(_arrays_in(batch.core.games, "games")) | {"observations": batch.core.observations}
         found |= dict(_arrays_in(batch.tallies, "tallies"))
@@ -233,14 +233,14 @@ class TrainEnv(MctfVecEnv):
         if batch.shield is not None:
             found |= {f"shield/{name}": values for name, values in batch.shield.remembered.items()}
         for name, member in batch.opponent.members.items():
-            if not hasattr(member, "plays"):  # those that do play game after game, and begin anew
+            if not hasattr(member, "plays"):  # members that play game by game start anew instead
                 found |= dict(_arrays_in(member, f"opponent/{name}"))
         return found
 
     def put(self, saved: dict[str, np.ndarray], seed: int, pool: dict[str, Any], snapshots: Any) -> None:
-        """Go on where `arrays`, the batch's seed and `Pool.facts` were taken in this stage.
+        """Restore this stage from a checkpoint: `arrays`, the batch's seed and `Pool.facts`.
 
-        ``snapshots`` reads the network of a snapshot's name.
+        ``snapshots`` reads the network of a snapshot by its name.
         """
         self.play_as_stage_says()
         self.batch.opponent.remember(pool["members"], snapshots)
@@ -253,14 +253,14 @@ class TrainEnv(MctfVecEnv):
 
 
 def carriers_of(core: BatchedMctf) -> np.ndarray:
-    """Numbers of an observation that tell who of the own team holds the flag."""
+    """Return the observation indices that tell which boat of the own team holds the flag."""
     keys = [key if isinstance(key, str) else "/".join(key) for key in core.observation_keys]
     own = [k for k, key in enumerate(keys) if key.endswith("has_flag") and not key.startswith("opponent")]
     return np.array(own, np.int64)
 
 
 def _arrays_in(thing: Any, name: str) -> Iterator[tuple[str, np.ndarray]]:
-    """Arrays that an object or named tuple holds, by name; they are the live ones."""
+    """Yield the live arrays of an object or named tuple, by name."""
     items = zip(thing._fields, thing, strict=True) if hasattr(thing, "_fields") else sorted(vars(thing).items())
     for key, value in items:
         if isinstance(value, np.ndarray) and value.dtype.kind in "biuf":

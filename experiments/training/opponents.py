@@ -1,4 +1,4 @@
-"""Opponents from a pool: each game of a batch has one of them, drawn by the league's matching rule, to its end."""
+"""A pool of opponents: each game of a batch draws one by the league's matching rule and plays it to the end."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from ..entries.team import make_team
 from .config import SELF, League, Stage
 
 LAST = 50
-"""Games that a mean score is over."""
+"""Number of latest games in a mean score."""
 
 
 def opponent_of(name: str, every: int = 1) -> Any:
-    """The batch policy of a name: those that play batches do, others one game after another, asked every so often."""
+    """Return a batch policy by name; one that cannot play batches plays game by game, every ``every`` steps."""
     if plays_batches(name):
         return policies.make_batch(name)
     policies.check(name)
@@ -34,14 +34,13 @@ def opponent_of(name: str, every: int = 1) -> Any:
 
 
 class Pool:
-    """A `BatchPolicy` made of several. A game keeps its opponent to its end, also a snapshot that is no longer drawn.
+    """A `BatchPolicy` made of several. A game keeps its opponent to the end, even a snapshot no longer drawn.
 
     Args:
-        stage: whose opponents they are, and how long they wait between tags; "self" among them stands for the snapshots
-            added by `add_snapshot`.
-        league: the matching rule and how many snapshots are kept.
+        stage: gives the opponents and their time between tags; "self" stands for snapshots added by `add_snapshot`.
+        league: matching rule and number of snapshots stored.
         seed: of the draws.
-        every: game steps between two questions to members that play one game after another.
+        every: game steps between calls of members that play game by game.
     """
 
     def __init__(self, stage: Stage, league: League, seed: int, every: int = 1) -> None:
@@ -58,7 +57,7 @@ class Pool:
         self._core: Any = None
 
     def add_snapshot(self, network: Network, number: int) -> None:
-        """Add the learner as it is; the oldest snapshot is drawn no more where there are too many."""
+        """Add the current learner; beyond the league's limit the oldest snapshot is no longer drawn."""
         name = f"{SELF}_{number}"
         ours = [one for one in self.scores if one.startswith(f"{SELF}_")]
         if len(ours) >= self.league.keep:
@@ -74,7 +73,7 @@ class Pool:
         return LearnedBatch(network, name, sample=network.kind == "discrete")
 
     def _forget_unused(self) -> None:
-        """Let go of snapshots that are not drawn any more and that no game plays against."""
+        """Remove snapshots that are not drawn any more and that no game plays against."""
         still = set(self.scores) | (set() if self._core is None else set(self.playing))
         self.members = {name: member for name, member in self.members.items() if name in still}
 
@@ -88,12 +87,12 @@ class Pool:
         self._out = np.zeros((core.n_games, int(np.sum(core.team == team)), 2))
 
     def _waits(self, games: int) -> Array:
-        """Times between tags, s, of so many games (games,)."""
+        """Draw the opponent's time between tags for each game (games,), s."""
         cooldown_s = self.stage.cooldown_s or 0.0
         return self._rng.uniform(*cooldown_s, games) if isinstance(cooldown_s, tuple) else np.full(games, cooldown_s)
 
     def restart(self, chosen: BoolArray, seed: int) -> None:
-        """Begin the chosen games (B,) anew, each with an opponent drawn anew."""
+        """Restart the chosen games (B,), each with a newly drawn opponent."""
         for member in self.members.values():
             member.restart(chosen, seed)
         for game in np.flatnonzero(chosen):
@@ -102,7 +101,7 @@ class Pool:
         self.waits_s[chosen] = self._waits(int(np.sum(chosen)))
 
     def act(self, core: Any, team: int) -> Array:
-        """Commands (B, n_team, 2); the array is reused by the next call."""
+        """Return commands (B, n_team, 2); the next call reuses the array."""
         if self.stage.cooldown_s is not None:
             hold_back(core, team, self.waits_s)
         for name, member in self.members.items():
@@ -114,7 +113,7 @@ class Pool:
         return self._out
 
     def ended(self, core: Any, games: BoolArray) -> None:
-        """Note how the learner did in games (B,) that have ended."""
+        """Record the learner's results in games (B,) that have ended."""
         for game in np.flatnonzero(games):
             own, foe = core.captures[game, 1 - self._team], core.captures[game, self._team]
             score = 0.5 + 0.5 * float(np.sign(own - foe))
@@ -122,7 +121,7 @@ class Pool:
                 self.scores[self.playing[game]].append(score)
 
     def weights(self) -> dict[str, float]:
-        """Each member's weight in the draw."""
+        """Return each member's weight in the draw."""
         means = {name: float(np.mean(scores)) if scores else 0.5 for name, scores in self.scores.items()}
         return {name: (1.0 - mean) ** self.league.power + self.league.floor for name, mean in means.items()}
 
@@ -132,7 +131,7 @@ class Pool:
         return str(self._rng.choice(list(weights), p=share / share.sum()))
 
     def facts(self) -> dict[str, Any]:
-        """What it remembers beside arrays, ready for JSON."""
+        """Return the state besides arrays, JSON-ready."""
         return {
             "members": list(self.members),
             "seed": self._seed,
@@ -143,13 +142,13 @@ class Pool:
         }
 
     def remember(self, names: Sequence[str], snapshots: Callable[[str], Network]) -> None:
-        """Have the members that were told, snapshots read anew; before `reset`."""
+        """Restore the members by name, snapshots read from file; call before `reset`."""
         self.members = {
             name: self.members[name] if name in self.members else self._playing(snapshots(name), name) for name in names
         }
 
     def put(self, facts: dict[str, Any]) -> None:
-        """Go on with what `facts` told of a pool with the same members; after `reset`."""
+        """Restore what `facts` returned for a pool with the same members; call after `reset`."""
         self._seed = facts["seed"]
         self.playing[:] = facts["playing"]
         self.waits_s[:] = facts["waits_s"]
@@ -158,9 +157,9 @@ class Pool:
 
 
 def hold_back(core: Any, team: int, cooldown_s: Array) -> None:
-    """Slow the clocks that a team's boats recharge by, so that a whole cool-down takes ``cooldown_s`` (B,).
+    """Slow the tagging clocks of a team's boats, so that a whole cool-down takes ``cooldown_s`` (B,).
 
-    Boats see the share of the cool-down that is over, so what they see means the same.
+    Boats observe the elapsed share of the cool-down, so their observations keep their meaning.
     """
     boats = np.flatnonzero(core.team == team)
     elapsed_s, whole_s = core.tagging_cooldown_s, core.config.tagging_cooldown_s
@@ -170,12 +169,12 @@ def hold_back(core: Any, team: int, cooldown_s: Array) -> None:
 
 
 class EachGame:
-    """A `BatchPolicy` round a policy for single games, slow: each game has a policy and a twin of the game of its own.
+    """A `BatchPolicy` around a policy for single games; slow, since each game has its own policy and copy of the game.
 
     Args:
         name: of the policy, as `steerclear.policies.make` takes it.
-        every: game steps between two questions to it. The policy is told that a step is so long, and what it answers is
-            held as a course steered: cheaper, and a coarser player of the same kind.
+        every: game steps between calls. The policy sees this as the length of a step, and its command is held as a
+            course: cheaper, but it plays more coarsely.
     """
 
     def __init__(self, name: str, every: int = 1) -> None:
@@ -195,18 +194,18 @@ class EachGame:
         self._course_deg = np.zeros((core.n_games, self._own.size))
 
     def plays(self, games: BoolArray) -> None:
-        """Only these games (B,) are played from now on."""
+        """Play only these games (B,) from now on."""
         self._mine = games
 
     def restart(self, chosen: BoolArray, seed: int) -> None:
-        """Begin the chosen games (B,) anew."""
+        """Restart the chosen games (B,)."""
         for game in np.flatnonzero(chosen):
             self._seeds[int(game)] = seed + int(game)
             self._twins.pop(int(game), None)
         self._left[chosen] = 0
 
     def act(self, core: Any, team: int) -> Array:
-        """Commands (B, n_team, 2); the array is reused by the next call."""
+        """Return commands (B, n_team, 2); the next call reuses the array."""
         heading_deg = core.state[:, self._own, L.HEADING]
         self._out[..., 1] = (self._course_deg - heading_deg + 180.0) % 360.0 - 180.0
         for game in np.flatnonzero(self._mine & (self._left == 0)):
@@ -217,7 +216,7 @@ class EachGame:
         return self._out
 
     def _seen_as(self, config: GameConfig) -> GameConfig:
-        """The rules with steps as long as the time between two questions."""
+        """Return the rules with steps as long as the time between calls."""
         return config if self.every == 1 else config.replace(decision_steps=config.decision_steps * self.every)
 
     def _ask(self, core: Any, game: int) -> Array:

@@ -1,8 +1,8 @@
-"""Raids that learn: PPO (Schulman et al. 2017) over the numbers of a scripted raid, which hold for a time.
+"""Training of raids: PPO (Schulman et al. 2017) over the parameters of a scripted raid, each held for a time.
 
-Games begin at moments at which raids of the script go to a phase or take the flag: a raid ends in a capture more often
-the nearer to one it begins, and of games that begin as usual hardly any second teaches how a flag is brought home
-(Salimans and Chen, "Learning Montezuma's Revenge from a Single Demonstration", 2018).
+Games start from recorded states in which a scripted raid enters a phase or takes the flag. Starts nearer to a capture
+end in one more often; from regular starts almost no step shows how to bring a flag home (Salimans and Chen, "Learning
+Montezuma's Revenge from a Single Demonstration", 2018).
 """
 
 from __future__ import annotations
@@ -37,36 +37,36 @@ PLACE = (
     *("state", "previous_position", "error_is_float32", "is_tagged", "is_disabled", "has_flag", "oob", "on_side"),
     *("driven", "tagging_cooldown_s", "touching", "contact", "flag_position", "flag_taken"),
 )
-"""Arrays of a game that say how it stands; clocks, scores and random numbers are the new game's own."""
+"""Arrays that define a game's state; clocks, scores and random numbers are the new game's own."""
 TURNED = (L.RUDDER, L.HEADING_ERROR, L.HEADING_INTEGRAL, L.TURN_RATE)
-"""Numbers of a boat's state that change their sign in a mirror."""
+"""Entries of a boat's state that change sign when mirrored."""
 KINDS = ("bait", "drag", "run", "flag", "alone", "alone_flag")
-"""What a raid goes on to at a moment: its phases, and that it has taken the flag; the last two of boats alone."""
+"""Kinds of start states: the phase the raid enters, or that it took the flag; the last two are of single boats."""
 LONGEST_S = 100.0
-"""Time until a game that began in a raid is over, s."""
+"""Game time after which a game that began in a raid is ended, s."""
 RECORDED_SEED = 810_000
-"""First seeds of the games that moments are recorded from are multiples of it."""
+"""Seed offset between the sets of games that start states are recorded from."""
 COUNTS = ("captures", "captures_against", "grabs", "grabs_against", "hits")
 NONE = Features(np.zeros(0, np.int64), np.zeros(0, np.int64), 0.0)
 CRITIC_RATE, FIRST_GAIN = 1e-3, 1e-3
 Floats = NDArray[np.float32]
 Moment = tuple[dict[str, Array], list[float], int, str]
-"""Arrays of `PLACE`, what the raid remembered, number in `KINDS`, name of the opponent."""
+"""Start state: arrays of `PLACE`, memory of the raid, index in `KINDS`, name of the opponent."""
 
 
 class Recorder(RaidsBatch):
-    """Raids of the script's numbers, changed at random, and the moments at which they go on (``found``).
+    """Plays scripted raids with random changes of their parameters, and records start states in ``found``.
 
     Args:
         interval: game steps for which a decision is held.
-        spread: deviation of the numbers, in units of `shape.LIMITS`.
-        seed: of the draws.
+        spread: standard deviation of the parameters, in units of `shape.LIMITS`.
+        seed: of the random draws.
         pool: of the opponents.
     """
 
     def __init__(self, interval: int, spread: float, seed: int, pool: Pool) -> None:
         rng = np.random.default_rng([seed, 12])
-        drawn: Any = SimpleNamespace(interval=interval)  # stands for a network: the script's numbers and some noise
+        drawn: Any = SimpleNamespace(interval=interval)  # replaces a network: the script's parameters plus noise
         drawn.outputs = lambda seen, roles: spread * rng.normal(size=(len(seen), len(NAMES)))
         self.network, self.name, self._team = drawn, "recorder", -1
         self.found: list[Moment] = []
@@ -76,7 +76,7 @@ class Recorder(RaidsBatch):
         before = self._stood[game]
         asks = super()._asks(game)
         raid = self.raids[game]
-        by_numbers = raid.phase > Phase.GATHER and raid.passage is None  # habits that a passage rests on are not kept
+        by_numbers = raid.phase > Phase.GATHER and raid.passage is None  # the raid's memory does not include a passage
         if self._stood[game] != before and by_numbers:
             place = {name: getattr(self._core.games, name)[game].copy() for name in PLACE}
             kind = KINDS.index("flag") if raid.held else raid.phase - 1
@@ -88,7 +88,7 @@ class Recorder(RaidsBatch):
 
 
 def recorded(config: Config, spread: float, seed: int) -> list[Moment]:
-    """Moments of as many games as a training plays at once, with its rules and shield, against its opponents."""
+    """Return start states from ``config.games`` games with the training's rules, shield and opponents."""
     stage = config.stages[0]
     core = core_of(config, config.games, seed, stage)
     set_tags(core, stage)
@@ -108,20 +108,20 @@ def recorded(config: Config, spread: float, seed: int) -> list[Moment]:
 
 
 class BeginInRaids:
-    """Stands for a core's ``reset``: games begin at moments of raids, half of them mirrored.
+    """Replaces a core's ``reset``: games begin from recorded start states, half of them mirrored.
 
     Args:
         core: the games.
-        moments: to draw from.
-        shares: how often each of `KINDS` comes.
-        seed: of the draws.
+        moments: start states to draw from.
+        shares: relative frequency of each of `KINDS`.
+        seed: of the random draws.
 
     Attributes:
-        drawn: (B,) number of the moment that each game began with.
+        drawn: (B,) index of each game's start state.
         mirrored: (B,) whether it was mirrored.
 
     Raises:
-        ConfigError: of some kind that has a share there is no moment.
+        ConfigError: a kind with a share has no start state.
     """
 
     def __init__(self, core: Any, moments: Sequence[Moment], shares: Sequence[float], seed: int) -> None:
@@ -140,7 +140,7 @@ class BeginInRaids:
         core.reset = self
 
     def __call__(self, mask: BoolArray | None = None, seed: int | None = None) -> Any:
-        """As `BatchedMctf.reset`."""
+        """Reset games like `BatchedMctf.reset`, then set their start states."""
         self._reset(mask=mask, seed=seed)
         for game in np.flatnonzero(np.ones(self._core.n_games, np.bool_) if mask is None else mask):
             fit = self._of_kind[self._rng.choice(len(KINDS), p=self._shares)]
@@ -153,17 +153,17 @@ class BeginInRaids:
         return self._core.observe()
 
     def remind(self, raid: Raid, game: int) -> None:
-        """Let a raid go on where the moment of its game was taken."""
+        """Restore a raid's memory from the start state of its game."""
         memory = self.moments[self.drawn[game]][1]
         raid.remember(memory, float(self._core.time_s[game]), bool(self.mirrored[game]))
 
     def opponent(self, game: int) -> str:
-        """Whom the moment of a game was recorded against."""
+        """Return the opponent that a game's start state was recorded against."""
         return self.moments[self.drawn[game]][3]
 
 
 def mirror(core: Any, game: int) -> None:
-    """Turn a game's south and north round."""
+    """Swap south and north in a game."""
     games, height_m = core.games, core.config.env_bounds_m[1]
     state = games.state[game]
     state[:, L.Y] = height_m - state[:, L.Y]
@@ -175,15 +175,15 @@ def mirror(core: Any, game: int) -> None:
 
 @dataclass
 class Answer:
-    """What was seen and answered, and what came of it until the next.
+    """A network's decision and its outcome until the next one.
 
     Attributes:
-        seen: (n,) what the network was told.
-        units: (k,) drawn.
-        chance: logarithm of the density of that.
-        earned: discounted reward until the next answer.
-        decisions: time until then.
-        after: what it was told then; None: the game, or the raid that it began with, was over.
+        seen: (n,) observation.
+        units: (k,) sampled action.
+        chance: its log density.
+        earned: discounted reward until the next decision.
+        decisions: team decisions until then.
+        after: next observation; None: the game, or the raid that it began with, was over.
     """
 
     seen: Floats
@@ -195,7 +195,7 @@ class Answer:
 
 
 class RaidsLearner:
-    """Actor and critic; what is drawn about the actor's answers deviates in units of `shape.LIMITS`."""
+    """Actor and critic; actions are Gaussian around the actor's output, in units of `shape.LIMITS`."""
 
     def __init__(self, config: Config) -> None:
         torch.manual_seed(config.seed)
@@ -211,7 +211,7 @@ class RaidsLearner:
         self._critics = torch.optim.Adam(self.critic.parameters(), lr=CRITIC_RATE, eps=1e-5)
 
     def begin_with(self, network: Network) -> None:
-        """Put the weights of a network of the same shape into the actor."""
+        """Copy the weights of a network of the same shape into the actor."""
         layers = [layer for layer in self.actor if isinstance(layer, nn.Linear)]
         shapes = [tuple(reversed(layer.weight.shape)) for layer in layers]
         if [weight.shape for weight in network.weights] != [(1, *shape) for shape in shapes]:
@@ -222,7 +222,7 @@ class RaidsLearner:
                 layer.bias.copy_(torch.as_tensor(bias[0]))
 
     def answers(self, seen: Floats) -> list[Answer]:
-        """Drawn answers to what is seen (N, n)."""
+        """Sample decisions for observations (N, n)."""
         with torch.no_grad():
             mean, spread = self.actor(self._tensor(seen)).cpu().numpy(), self.spread.exp().cpu().numpy()
         noise = self._rng.normal(size=mean.shape)
@@ -231,7 +231,7 @@ class RaidsLearner:
         return [Answer(*one) for one in zip(seen, units, chances.tolist(), strict=True)]
 
     def learn(self, games: Sequence[Sequence[Answer]]) -> dict[str, float]:
-        """Learn from a rollout's answers, of each game in order; what there is to tell."""
+        """Update from a rollout's decisions, given per game in order; return figures for the curve."""
         answers = [answer for game in games for answer in game]
         seen = self._tensor(np.stack([one.seen for one in answers]))
         units = self._tensor(np.stack([one.units for one in answers]))
@@ -251,7 +251,7 @@ class RaidsLearner:
         return {"answers": len(answers), "explained": explained, "divergence": far[-1], "spread": spread}
 
     def _gains(self, games: Any, answers: Sequence[Answer], seen: Any) -> tuple[Floats, Floats]:
-        """Advantages by GAE over times of different lengths, and values, of all answers."""
+        """Return advantages (GAE, for decisions of different lengths) and values of all decisions."""
         ppo = self._config.ppo
         after = self._tensor(np.stack([one.seen if one.after is None else one.after for one in answers]))
         with torch.no_grad():
@@ -267,7 +267,7 @@ class RaidsLearner:
         return gains, values
 
     def _improve(self, seen: Any, units: Any, chances: Any, gain: Any) -> float:
-        """A step of the actor; how far it is from who answered."""
+        """Update the actor once; return the approximate KL divergence from the sampling policy."""
         ppo = self._config.ppo
         now = (-0.5 * ((units - self.actor(seen)) / self.spread.exp()) ** 2 - self.spread).sum(1)
         ratio = torch.exp(now - chances)
@@ -288,13 +288,13 @@ class RaidsLearner:
         return torch.as_tensor(np.asarray(numbers, np.float32), device=self._device)
 
     def network(self, card: dict[str, Any]) -> Network:
-        """The actor in numpy."""
+        """Return the actor as a numpy network."""
         config = self._config
         return Network(*numbers_of(self.actor), NONE, config.net.activation, "raids", config.interval, SEEN, card)
 
 
 def _network(config: Config, outputs: int) -> nn.Sequential:
-    """Layers; the last begins near nothing, so that raids begin as the script's."""
+    """Build the layers; the last starts near zero, so that raids start as the script's."""
     found: list[nn.Module] = []
     for before, after in pairwise((SEEN, *config.net.hidden, outputs)):
         found += [nn.Linear(before, after), ACTIVATIONS[config.net.activation]()]
@@ -305,7 +305,7 @@ def _network(config: Config, outputs: int) -> nn.Sequential:
 
 
 class RaidsTraining(Training):
-    """A training of raids in a folder, a decision being one of a team; checkpoints are not kept: it begins anew."""
+    """Training of raids in a folder; one decision is a team's. It writes no checkpoints and cannot be resumed."""
 
     def __init__(self, config: Config, folder: Path, resume: bool = False) -> None:
         if config.game(config.stages[0]).team_size != BOATS:
@@ -314,7 +314,7 @@ class RaidsTraining(Training):
         self.env = TrainEnv(config.model_copy(update={"interval": 1}))
         self.batch, self.pool = self.env.batch, self.env.batch.opponent
         self.batch.actions = "continuous"
-        self.team = RaidsBatch(Network([], [], NONE, "tanh", "raids", config.interval, SEEN))  # is never asked
+        self.team = RaidsBatch(Network([], [], NONE, "tanh", "raids", config.interval, SEEN))  # network is never used
         self._all = np.arange(config.games)
         self._open: list[Answer | None] = [None] * config.games
         self.learner = RaidsLearner(config)
@@ -322,7 +322,7 @@ class RaidsTraining(Training):
             self.learner.begin_with(read_weights(config.start))
 
     def run(self, notice: Notice = lambda done, words: None) -> None:
-        """Record, learn, write; what is interrupted keeps all up to the last whole rollout."""
+        """Record start states, train, and write weights; an interruption loses only the unfinished rollout."""
         self._begin(notice)
         with threads(self.config.threads):
             try:
@@ -334,11 +334,11 @@ class RaidsTraining(Training):
         self.write_last()
 
     def network(self) -> Network:
-        """The actor as it is now."""
+        """Return the current actor."""
         return self.learner.network(card_of(self.config))
 
     def _begin(self, notice: Any) -> None:
-        """Record moments, and begin games at them."""
+        """Record start states and start games from them."""
         seed, found = self.config.seed, []
         for part, spread in enumerate(self.config.options.recorded, start=1):
             found += recorded(self.config, spread, part * RECORDED_SEED + seed)
@@ -351,7 +351,7 @@ class RaidsTraining(Training):
         self._restart(np.ones(core.n_games, np.bool_))
 
     def _iterate(self) -> str:
-        """A rollout and what is learned from it; words for people."""
+        """Play a rollout and learn from it; return a progress line."""
         began = time.perf_counter()
         answers, games = self._rollout()
         played = time.perf_counter()
@@ -365,7 +365,7 @@ class RaidsTraining(Training):
         return f"captures {row['captures'] or 0.0:.2f}, against {row['captures_against'] or 0.0:.2f} a raid"
 
     def _rollout(self) -> tuple[list[list[Answer]], list[dict[str, float]]]:
-        """Answers of each game in order, and totals of games that ended."""
+        """Return the decisions of each game in order, and totals of ended games."""
         answers: list[list[Answer]] = [[] for _ in self._all]
         ended: list[dict[str, float]] = []
         for _ in range(self.config.ppo.steps):
@@ -381,7 +381,7 @@ class RaidsTraining(Training):
         return answers, ended
 
     def _answer(self, asked: Any, answers: list[list[Answer]]) -> None:
-        """Let the network answer in the games that ask."""
+        """Let the network decide in the games that ask."""
         if not asked.size:
             return
         given = self.learner.answers(self.team.seen(asked))
@@ -394,7 +394,7 @@ class RaidsTraining(Training):
             self._open[game] = one
 
     def _decide(self, ended: list[dict[str, float]]) -> tuple[Array, BoolArray]:
-        """A decision in all games: what the team earned (B,), and which games ended (B,)."""
+        """Play one team decision in all games; return the team's reward (B,) and which games ended (B,)."""
         earned, over = np.zeros(self._all.size), np.zeros(self._all.size, np.bool_)
         self.team.aim(self._all, self.config.interval)
         for _ in range(self.config.interval):
@@ -408,7 +408,7 @@ class RaidsTraining(Training):
         return earned, over
 
     def _renewed(self, asked: Any, answers: list[list[Answer]], ended: list[dict[str, float]]) -> Any:
-        """Begin games anew whose raid is over, or where no opponent stays at home the time; the games that ask now."""
+        """Restart games whose raid is over or that exceed `LONGEST_S`; return the games that ask for a decision."""
         raids, core = self.team.raids, self.batch.core
         ended_raid = [raid.phase == Phase.GATHER and not raid.unguarded for raid in raids]
         over = np.array(ended_raid) | (core.time_s > LONGEST_S)
@@ -421,7 +421,7 @@ class RaidsTraining(Training):
         return np.union1d(asked[~over[asked]], self.team.advance(np.flatnonzero(over))).astype(np.int64)
 
     def _close(self, over: BoolArray, answers: list[list[Answer]]) -> None:
-        """End the answers of games that are over."""
+        """Complete the open decisions of games that are over."""
         for game in np.flatnonzero(over):
             one = self._open[game]
             if one is not None:
@@ -429,7 +429,7 @@ class RaidsTraining(Training):
             self._open[game] = None
 
     def _restart(self, over: BoolArray) -> None:
-        """Begin the raids of games that began anew, against the opponents that they were recorded from."""
+        """Begin the raids of restarted games, against the opponents of their start states."""
         if not over.any():
             return
         self.team.restart(over, 0)

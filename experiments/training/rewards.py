@@ -1,4 +1,4 @@
-"""Reward terms as small objects; a learner's reward is their weighted sum, each game step."""
+"""Reward terms; a learner's reward in each game step is their weighted sum."""
 
 from __future__ import annotations
 
@@ -17,40 +17,40 @@ Earned = Callable[[Any, BoolArray], Array]
 
 
 class Term:
-    """A reward term that remembers nothing.
+    """A stateless reward term.
 
     Args:
-        earned: of the last game step, (B, n), or (B, 1) where the team shares it: takes the batch, and (B, n) whose
-            commands the shield changed.
+        earned: returns the last game step's reward, (B, n), or (B, 1) if the team shares it, from the batch and (B, n)
+            whether the shield changed each command.
     """
 
     def __init__(self, earned: Earned) -> None:
         self.reward = earned
 
     def begin(self, batch: Any, games: BoolArray) -> None:
-        """Games (B,) begin anew."""
+        """Start games (B,) anew."""
 
 
 def _net(batch: Any, event: int) -> Array:
-    """(B, 1) an event of the own team less the other's: captures 0, grabs 1, tags 2."""
+    """Return (B, 1): events of the own team minus the other's; events are captures 0, grabs 1, tags 2."""
     events = batch.core.events
     net: Array = (events[:, batch.team, event] - events[:, 1 - batch.team, event]).astype(float)[:, None]
     return net
 
 
 def _remembered(before: Array | None, now: Array, games: BoolArray) -> Array:
-    """What is remembered, as it is now in games (B,) that begin, and everywhere where nothing was."""
+    """Return the stored values, replaced by the current ones in games (B,) that begin or if nothing was stored."""
     kept = now.copy() if before is None or before.shape != now.shape else before
     kept[games] = now[games]
     return kept
 
 
 class Changed:
-    """A term of what the last game step changed in a fact of the core about boats.
+    """A reward for changes of a boat quantity of the core in the last game step.
 
     Args:
-        fact: name of the array.
-        earned: (B, n) from the batch and that fact, before and now.
+        fact: name of its array.
+        earned: returns (B, n) from the batch and the array before and after the step.
     """
 
     before: Array | None = None
@@ -59,20 +59,20 @@ class Changed:
         self._fact, self._earned = fact, earned
 
     def begin(self, batch: Any, games: BoolArray) -> None:
-        """Remember it."""
+        """Store the array for games (B,) that begin."""
         self.before = _remembered(self.before, getattr(batch.core, self._fact)[:, batch.boats], games)
 
     def reward(self, batch: Any, changed: BoolArray) -> Array:
-        """(B, n) of the last game step."""
+        """Return the reward (B, n) of the last game step."""
         before, self.before = self.before, getattr(batch.core, self._fact)[:, batch.boats]
         return self._earned(batch, before, self.before)
 
 
 def _own(batch: Any, before: BoolArray, now: BoolArray) -> Array:
-    """+1 to the boat that grabs, +2 to the one that brings the flag home, -1 to the one that loses it.
+    """Reward +1 for the boat that grabs the flag, +2 for the one that brings it home, -1 for the one that loses it.
 
-    Credit for who did it. A lost flag costs the grab's prize: else boats that grab in turn and never come home earn
-    more than those that do.
+    A lost flag costs as much as the grab earned. Otherwise boats that grab in turn and never come home earn more than
+    boats that capture.
     """
     given = before & ~now
     home = given & (batch.core.events[:, batch.team, 0] > 0)[:, None]
@@ -81,11 +81,11 @@ def _own(batch: Any, before: BoolArray, now: BoolArray) -> Array:
 
 
 class Progress:
-    """Metres gained per field width: towards the other flag for boats without one, towards the own side with it.
+    """Progress in metres per field width: towards the other flag, or towards the own side when carrying it.
 
-    The way to the flag counts while it is home and the boat free; a change of what is sought earns nothing by itself.
-    What a tag ends is kept: it leads boats to the flag who know nothing yet, at the price that running into tags again
-    and again earns a little. See `Advance`.
+    The way to the flag counts while the flag is home and the boat untagged; a change of goal earns nothing by itself.
+    A tagged boat keeps its progress. This leads untrained boats to the flag, but running into tags repeatedly earns a
+    little. See `Advance`.
     """
 
     share_back = 0.0
@@ -94,13 +94,13 @@ class Progress:
     gained: Array | None = None
 
     def begin(self, batch: Any, games: BoolArray) -> None:
-        """Remember ways."""
+        """Store distances and goals for games (B,) that begin."""
         way, goal = self._ways(batch)
         self.way, self.goal = _remembered(self.way, way, games), _remembered(self.goal, goal, games)
         self.gained = _remembered(self.gained, np.zeros(way.shape), games)
 
     def reward(self, batch: Any, changed: BoolArray) -> Array:
-        """(B, n) of the last game step."""
+        """Return the reward (B, n) of the last game step."""
         way, goal = self._ways(batch)
         tagged = batch.core.is_tagged[:, batch.boats]
         same = (goal == self.goal) & (goal > 0)
@@ -112,7 +112,7 @@ class Progress:
 
     @staticmethod
     def _ways(batch: Any) -> tuple[Array, Array]:
-        """(B, n) metres to go, and what is sought: 0 nothing, 1 the flag, 2 the own side."""
+        """Return (B, n) metres to go, and the goal: 0 none, 1 the flag, 2 the own side."""
         core, boats, foe = batch.core, batch.boats, 1 - batch.team
         state = core.state[:, boats]
         x, y = state[..., L.X], state[..., L.Y]
@@ -126,33 +126,33 @@ class Progress:
 
 
 class Advance(Progress):
-    """`Progress` of which a boat gives back all since it last set out when it is tagged; a capture keeps it.
+    """`Progress`, but a tagged boat gives back all it earned since it last set out; a capture keeps it.
 
-    Nothing is earned without captures, so what is best stays best (potential-based: Ng, Harada and Russell 1999); boats
-    that know nothing yet learn from it to keep away from tags first.
+    Without captures the sum is zero, so the optimal policy does not change (potential-based: Ng, Harada and Russell
+    1999). Untrained boats learn from it to avoid tags first.
     """
 
     share_back = 1.0
 
 
 class Denied(Advance):
-    """The opponents' `Advance`, all of them together, with a minus sign and shared by the team.
+    """Negative sum of the opponents' `Advance`, shared by the team.
 
-    A tag earns at once what the tagged boat had gained, most from one that comes home with the flag: credit for
-    defending long before a capture is lost.
+    A tag immediately earns what the tagged boat had gained, most for a flag carrier near home. So defending is
+    rewarded long before a capture is lost.
     """
 
     def begin(self, batch: Any, games: BoolArray) -> None:
-        """Remember the opponents' ways."""
+        """Store the opponents' distances and goals."""
         super().begin(_other_team(batch), games)
 
     def reward(self, batch: Any, changed: BoolArray) -> Array:
-        """(B, n) of the last game step."""
+        """Return the reward (B, 1) of the last game step."""
         return -super().reward(_other_team(batch), changed).sum(axis=1, keepdims=True)
 
 
 def _other_team(batch: Any) -> Any:
-    """The games as the other team's."""
+    """Return the games as the other team sees them."""
     return SimpleNamespace(core=batch.core, boats=batch.others, team=1 - batch.team)
 
 
@@ -169,21 +169,21 @@ TERMS: dict[str, Callable[[], Any]] = {
     "collision": lambda: Term(lambda batch, changed: -batch.core.new_collisions[:, batch.boats].astype(float)),
     "intervention": lambda: Term(lambda batch, changed: -changed.astype(float)),
 }
-"""By the name that a config weighs them with; docs/train.md says what each is.
+"""Terms by their name in a config; docs/train.md describes each.
 
-``sparse``, ``captures`` and ``tags`` are the team's, which its boats share; ``tagging`` pays who made the tag. Of
-``collision`` the paper's Table 1 weighs 0.025, its Table 3 fits 0.25.
+The team shares ``sparse``, ``captures`` and ``tags``; ``tagging`` goes to the boat that tagged. For ``collision`` the
+paper's Table 1 gives the weight 0.025; its Table 3 fits 0.25.
 """
 
 
 class WeightedSum:
-    """The reward of a config.
+    """Reward of a config.
 
     Args:
         weights: by name of `TERMS`.
 
     Raises:
-        ConfigError: an unknown name.
+        ConfigError: unknown name.
     """
 
     def __init__(self, weights: Mapping[str, float]) -> None:
@@ -194,12 +194,12 @@ class WeightedSum:
         self.terms = {name: TERMS[name]() for name in weights}
 
     def begin(self, batch: Any, games: BoolArray) -> None:
-        """Games (B,) begin anew."""
+        """Start games (B,) anew."""
         for term in self.terms.values():
             term.begin(batch, games)
 
     def reward(self, batch: Any, changed: BoolArray) -> Array:
-        """(B, n) of the last game step."""
+        """Return the reward (B, n) of the last game step."""
         total = np.zeros((batch.core.n_games, len(batch.boats)))
         for name, term in self.terms.items():
             total += self.weights[name] * term.reward(batch, changed)

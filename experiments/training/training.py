@@ -1,4 +1,4 @@
-"""`Training`: what all algorithms share: a folder with a curve and weights, games for evaluation, and `training_of`."""
+"""`Training`: what all algorithms share: a folder with curve and weights, evaluation games, and `training_of`."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from .opponents import opponent_of
 
 BEST, FINAL, CURVE, TENSORBOARD = "best.npz", "final.npz", "curve.json", "tensorboard"
 Notice = Callable[[int, str], None]
-"""Told decisions made, and words for people."""
+"""Called with the number of decisions made and a progress line."""
 MADE_BY = {
     "ppo": ("ppo", "PpoTraining"),
     "qmix": ("qmix", "QmixTraining"),
@@ -37,14 +37,14 @@ MADE_BY = {
 
 
 class DivergedError(SteerclearError):
-    """The network's numbers are no longer finite."""
+    """The loss is no longer finite."""
 
     def __init__(self, remedy: str) -> None:
         super().__init__(f"the loss is no longer finite; lower {remedy}, earlier work is kept")
 
 
 def training_of(config: Config, folder: Path, resume: bool) -> Any:
-    """What trains a config's algorithm, with ``run(notice)``, ``decisions`` and ``total``."""
+    """Return the training object for a config's algorithm, with ``run(notice)``, ``decisions`` and ``total``."""
     if resume and config.algorithm in ("qmix", "raids"):
         raise ConfigError(f"{config.algorithm} begins anew; leave out --resume")
     module, name = MADE_BY[config.algorithm]
@@ -55,9 +55,9 @@ class Training:
     """A training in a folder.
 
     Args:
-        config: what it is to be.
-        folder: where everything goes.
-        resume: go on from the folder's last checkpoint, where the algorithm keeps any.
+        config: its settings.
+        folder: where all files are written.
+        resume: continue from the folder's last checkpoint, if the algorithm writes any.
 
     Attributes:
         curve: one row per rollout.
@@ -72,11 +72,11 @@ class Training:
         self.best = -np.inf
 
     def network(self) -> Network:
-        """The actor as it is now."""
+        """Return the current actor."""
         raise NotImplementedError
 
     def evaluate(self) -> dict[str, Any]:
-        """Games against held-out opponents, and the best kept; the weights as they are lie there before the first."""
+        """Play games against held-out opponents and save the best weights; first save the current ones as final."""
         network, asked = self.network(), self.config.evaluation
         write_weights(network, self.folder / FINAL)
         shielded = self.config.shield != "none"
@@ -91,13 +91,13 @@ class Training:
         return found
 
     def write_last(self) -> None:
-        """Write the weights as they are, as the best too where no evaluation found any."""
+        """Write the current weights as final, and also as best if no evaluation saved any."""
         write_weights(self.network(), self.folder / FINAL)
         if not (self.folder / BEST).exists():
             write_weights(self.network(), self.folder / BEST)
 
     def write_curve(self, rows: Sequence[dict[str, Any]]) -> None:
-        """Write rows as the curve: JSON always, Parquet where pyarrow is there, TensorBoard where that is."""
+        """Write rows as the curve: as JSON; also as Parquet with pyarrow, and for TensorBoard, if installed."""
         settings = told_settings(self.config.told())
         content = {"command": "train", "settings": settings, "rows": rows, "versions": versions(), "machine": machine()}
         with whole_file(self.folder / CURVE, ConfigError) as part:
@@ -109,7 +109,7 @@ class Training:
 
 
 def _write_tensorboard(folder: Path, rows: Sequence[dict[str, Any]]) -> None:
-    """All rows anew: so that a resumed training has one curve."""
+    """Write all rows anew, so that a resumed training has one curve."""
     from torch.utils.tensorboard import SummaryWriter
 
     for old in folder.glob("events.*"):
@@ -122,7 +122,7 @@ def _write_tensorboard(folder: Path, rows: Sequence[dict[str, Any]]) -> None:
 
 
 def flat(row: dict[str, Any], before: str = "") -> dict[str, Any]:
-    """A row with the names of nested values joined by dots."""
+    """Flatten a row: names of nested values are joined by dots."""
     out: dict[str, Any] = {}
     for name, value in row.items():
         out |= flat(value, f"{before}{name}.") if isinstance(value, dict) else {f"{before}{name}": value}
@@ -130,13 +130,13 @@ def flat(row: dict[str, Any], before: str = "") -> dict[str, Any]:
 
 
 def means(games: Sequence[dict[str, float]], names: Sequence[str]) -> dict[str, Any]:
-    """Number of games and means of their totals; None where no game has ended."""
+    """Return the number of games and the means of their totals; None if no game has ended."""
     found = {name: float(np.mean([one[name] for one in games])) if games else None for name in names}
     return {"games": len(games), **found}
 
 
 def card_of(config: Config) -> dict[str, Any]:
-    """Where the networks of a training come from, for people."""
+    """Return the origin of a training's networks, for people."""
     return {
         "trained_with": "steerclear train",
         "preset": config.preset,
@@ -148,7 +148,11 @@ def card_of(config: Config) -> dict[str, Any]:
 
 
 def device_of(name: str) -> str:
-    """The device of a config's word."""
+    """Resolve a config's device: cuda, cpu or auto.
+
+    Raises:
+        ConfigError: cuda was chosen and torch finds no GPU.
+    """
     import torch
 
     there = torch.cuda.is_available()
@@ -159,7 +163,7 @@ def device_of(name: str) -> str:
 
 @contextmanager
 def threads(count: int) -> Iterator[None]:
-    """Let torch use so many threads inside."""
+    """Let torch use that many threads inside."""
     import torch
 
     before = torch.get_num_threads()
@@ -173,7 +177,7 @@ def threads(count: int) -> Iterator[None]:
 def play_games(
     config: Config, own: Network, opponent: str, games: int, seed: int, shielded: bool
 ) -> list[dict[str, float]]:
-    """Games of a network, many at once, as blue: a row each.
+    """Play games of a network as blue, all at once, and return a row per game.
 
     Args:
         config: whose rules are played.
@@ -181,10 +185,10 @@ def play_games(
         opponent: name of the opponent.
         games: how many.
         seed: of starts and policies.
-        shielded: the team has the config's shield.
+        shielded: whether the team has the config's shield.
 
     Returns:
-        Captures for less against (``net``) and the counts of `EVENTS`, hits and interventions over the whole team.
+        Own captures minus the opponent's (``net``) and the counts of `EVENTS`; hits and interventions are the team's.
     """
     core = core_of(config, games, seed)
     core.reset(seed=seed)
@@ -207,11 +211,11 @@ def play_games(
 
 
 def summary_of(rows: Sequence[Mapping[str, float]]) -> dict[str, Any]:
-    """Means per game, and the 95 % interval of the net captures."""
+    """Return means per game, and the 95 % interval of the net captures."""
     if not rows:
         return {"games": 0}
     found: dict[str, Any] = {name: float(np.mean([row[name] for row in rows])) for name in ("net", *EVENTS)}
     interval = mean_interval([row["net"] for row in rows])
     for name, limit in (("net_low", interval.low), ("net_high", interval.high)):
-        found[name] = limit if np.isfinite(limit) else None  # none where all games ended alike
+        found[name] = limit if np.isfinite(limit) else None  # no interval if all games ended alike
     return {"games": len(rows), **found}
