@@ -1,7 +1,9 @@
-"""One decision after another, compiled: of one team, of boats that decide each for itself, or of thousands of games.
+"""One control step, compiled: for one team, for boats that decide each for itself, or for thousands of games.
 
-A decision takes up what is given, checks the nominal commands, then group by group finds backups, solves for the least
-change, and blends what is left of the backups with the nominal commands; it commits what is remembered, and hands over.
+The step checks the nominal commands (`filter.nominal`). Where one fails, it does this for each group of boats that can
+meet: find backups (`filter.backup_switch`), solve the QP for the least change (`filter.qp`), blend the remaining
+backups with the nominal commands (`filter.blend`). The hard line comes last (`filter.last_line`). Then the step stores
+what the next one needs.
 """
 
 from __future__ import annotations
@@ -47,7 +49,7 @@ LEAST_TURN_DEG = 1e-3
 
 @lean_kernel
 def _note_adversary_horizons(given: Array, scene: Scene) -> None:
-    """Note how long each boat counts as adversarial: what is given, or where that is NaN the settings."""
+    """Note for how long each boat is adversarial: as given, or by the settings where that is NaN."""
     tuning = scene.tuning
     for i in range(given.shape[0]):
         time_s = tuning.intruder_horizon_s if given[i, W.VISITING] != 0.0 else tuning.adversary_horizon_s
@@ -58,7 +60,7 @@ def _note_adversary_horizons(given: Array, scene: Scene) -> None:
 
 @lean_kernel
 def _one_of_one_team(scene: Scene) -> int:
-    """A boat that is decided for, where all such are of one team; -1: they are of several, or there is none."""
+    """Return a boat that is decided for if all of these are of one team, else -1."""
     team, found = scene.boats.team, -1
     for i in range(team.shape[0]):
         if scene.ours[i]:
@@ -70,7 +72,7 @@ def _one_of_one_team(scene: Scene) -> int:
 
 @lean_kernel
 def _reported_adversary_horizon(i: int, mate: int, scene: Scene) -> float:
-    """How long boat i counts as adversarial, s: 0 where its way is predicted, NaN of who is nobody's opponent."""
+    """Return how long boat i is adversarial, s: 0 if its way is predicted, NaN if it is nobody's opponent."""
     team = scene.boats.team
     if scene.ours[i] or (mate >= 0 and team[i] == team[mate]):
         return np.nan
@@ -79,10 +81,10 @@ def _reported_adversary_horizon(i: int, mate: int, scene: Scene) -> float:
 
 @kernel
 def load_decision(b: int, scene: Scene) -> None:
-    """Make decision b the scene's: boats at the moment its commands take effect, and what is remembered of them.
+    """Load decision b into the scene: boats at the moment its commands take effect, and what is remembered of them.
 
-    Tracks are run on straight by their age and by the delay, own boats through the delay by the model under the
-    commands on their way; what others may do meanwhile widens the errors of their positions.
+    Tracks are extrapolated straight on by their age and by the delay. Own boats are rolled out through the delay by
+    the model, under the commands on their way. What others may do meanwhile widens their position errors.
     """
     given, state, ours, tuning = scene.given[b], scene.state, scene.ours, scene.tuning
     for i in range(ours.shape[0]):
@@ -107,7 +109,7 @@ def load_decision(b: int, scene: Scene) -> None:
 
 @kernel
 def store_decision(b: int, scene: Scene) -> None:
-    """Write what decision number b has come to, and keep what is remembered of it."""
+    """Store what decision b has come to, and what is remembered of it."""
     given, state, command, reported = scene.given[b], scene.state, scene.command, scene.reported[b]
     mate = _one_of_one_team(scene)
     for i in range(state.shape[0]):
@@ -140,10 +142,10 @@ def store_decision(b: int, scene: Scene) -> None:
 
 @lean_kernel
 def _note_backup_hold(i: int, scene: Scene) -> None:
-    """Note whether boat i is on its backup, and for how long it stays so at least.
+    """Note whether boat i is on its backup, and for how long it must stay on it.
 
-    On the bound of what it must keep a boat would else take up the nominal command and its backup in turn, from step to
-    step, and one that turns at once would do so from side to side.
+    Without this hold, a boat at its required margin would switch between nominal command and backup in every step; a
+    boat that turns at once would weave.
     """
     memory, reason = scene.memory[i], scene.reason[i]
     backing_up = reason in (W.BACKUP, W.BEST_EFFORT)
@@ -158,10 +160,10 @@ def _note_backup_hold(i: int, scene: Scene) -> None:
 
 @lean_kernel
 def commit(scene: Scene) -> None:
-    """Keep every boat's manoeuvre for the next decision, as an absolute heading, and its margins.
+    """Keep every boat's manoeuvre for the next decision, as an absolute heading, with its margins.
 
-    Values that tables tell of opponents are each a barrier of its own, and boats with tables keep them apart. Margins
-    of a manoeuvre are not: another may trade one for the other, so for other boats the least counts for all.
+    A margin from a value table is a barrier for one opponent, so boats with tables remember one margin per opponent.
+    Other margins come from one manoeuvre, and another manoeuvre may trade one for the other: the least counts for all.
     """
     for i in range(scene.ours.shape[0]):
         memory, manoeuvre = scene.memory[i], scene.manoeuvre[i]
@@ -186,7 +188,7 @@ def commit(scene: Scene) -> None:
 
 @lean_kernel
 def _note_causes(scene: Scene) -> None:
-    """Note what each boat's nominal command is short of: of an opponent also where a teammate is nearer."""
+    """Note which constraint each nominal command violates; an opponent goes before a nearer teammate."""
     for i in range(scene.ours.shape[0]):
         short = scene.ours[i] and scene.satisfied[i] < ALL
         scene.violated[i] = scene.bound[i] if short else -1
@@ -197,10 +199,10 @@ def _note_causes(scene: Scene) -> None:
 
 @lean_kernel
 def _name_reasons(scene: Scene) -> None:
-    """Say of nominal commands that come out as they were that they passed, and where static constraints are active.
+    """Set the reason PASSED for nominal commands that come out unchanged, and name static constraints as active.
 
-    They are of a command that was changed for them, and keeps them now; and a barrier is of a boat that is to stop
-    since it tells nothing where that is.
+    A static constraint is active where a command was changed for it and satisfies it now. A registered barrier is
+    active where a boat stops because the barrier reports nothing at its position.
     """
     for i in range(scene.ours.shape[0]):
         if not scene.ours[i]:
@@ -216,14 +218,14 @@ def _name_reasons(scene: Scene) -> None:
 
 @lean_kernel
 def begin(scene: Scene) -> int:
-    """Check the nominal commands; returns how many groups of boats they are not sent to as they are."""
+    """Check the nominal commands; return the number of groups in which one fails."""
     screen(scene)
     return groups_left(scene)
 
 
 @lean_kernel
 def groups_left(scene: Scene) -> int:
-    """Note what nominal commands are short of and the manoeuvres found for them; returns how many groups are left."""
+    """Note what nominal commands violate and the manoeuvres found for them; return the number of groups left."""
     _note_causes(scene)
     for i in range(scene.ours.shape[0]):
         if scene.ours[i]:
@@ -233,7 +235,7 @@ def groups_left(scene: Scene) -> int:
 
 @lean_kernel
 def begin_group(group: int, scene: Scene) -> int:
-    """Make backups the commands of a group, and set up its program; returns how many boats take part in that."""
+    """Make backups the commands of a group and set up its QP; return the number of boats in the QP."""
     open_group(group, scene)
     back_up(scene)
     if all_spent(scene) or not any_may_be_blended(scene):
@@ -244,14 +246,14 @@ def begin_group(group: int, scene: Scene) -> int:
 
 @lean_kernel
 def end_group(scene: Scene, safe: bool, count: int) -> None:
-    """End the program of so many boats, and blend the other backups."""
+    """End the QP of ``count`` boats, and blend the other backups."""
     end_program(scene, safe, count)
     blend(scene)
 
 
 @lean_kernel
 def end(scene: Scene) -> None:
-    """Say what binds and why, and remember what was decided."""
+    """Note active constraints and reasons, and keep what the next decision needs."""
     close_groups(scene)
     keep_last_line(scene)
     commit(scene)
@@ -260,7 +262,7 @@ def end(scene: Scene) -> None:
 
 @lean_kernel
 def decide_scene(scene: Scene) -> None:
-    """The whole decision; sent commands are in ``scene.command``, reasons in ``scene.reason``."""
+    """Make the whole decision: filtered commands go to ``scene.command``, reasons to ``scene.reason``."""
     for group in range(begin(scene)):
         count, safe = begin_group(group, scene), False
         for _ in range(ROUNDS if count > 0 else 0):

@@ -1,4 +1,4 @@
-"""Which backup manoeuvre each boat of ours holds: found one boat at a time, the others' kept, until all fit."""
+"""Which backup manoeuvre each own boat holds: found one boat at a time, with the others' fixed, until all fit."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SWEEPS = 2
 
 @lean_kernel
 def _take(i: int, slot: int, rank: Rank, scene: Scene) -> None:
-    """Make the trial in ``slot`` boat i's plan."""
+    """Make the trial in ``slot`` boat i's manoeuvre."""
     for k in range(scene.path.shape[1]):
         copy_row(scene.path[i, k], scene.path[slot, k])
     copy_row(scene.manoeuvre[i], scene.manoeuvre[slot])
@@ -43,13 +43,13 @@ def _take(i: int, slot: int, rank: Rank, scene: Scene) -> None:
 def choose_manoeuvre(i: int, wanted_mps: float, done: int, best_of: bool, scene: Scene) -> None:
     """Give boat i a manoeuvre: the first that is safe, or with ``best_of`` the best.
 
-    Of manoeuvres that are alike the first is taken, to starboard before to port, as the rules of the road ask. The best
-    that screening found for the state one step on is good enough from here: where that, or the one in memory, is safe
-    no others are looked at. By tables manoeuvres differ from here only, so where an opponent is what the wanted
-    command is short of, all are. What a table refuses one step on it refuses for every manoeuvre: then the first that
-    keeps clear of all else will do.
+    Equal scores go to the first in the family: starboard before port, as the rules of the road ask. If the manoeuvre
+    found by the nominal check, or the remembered one, is safe from the present state, no others are tried. One
+    exception: by tables, manoeuvres differ only from the present state, so all are tried where the nominal command
+    violates the margin from an opponent. One step ahead, a table refuses all manoeuvres or none; then the first that
+    clears all else is taken.
 
-    Once the decision has cost its limit the best so far will do, see `workspace.all_spent`.
+    Once the decision has used its work budget, the best so far is taken, see `workspace.all_spent`.
     """
     state, boats = scene.state, scene.boats
     trial = state.shape[0]
@@ -79,13 +79,13 @@ def choose_manoeuvre(i: int, wanted_mps: float, done: int, best_of: bool, scene:
 
 @lean_kernel
 def refresh(i: int, scene: Scene) -> None:
-    """Rate boat i's plan again against the others' present plans."""
+    """Score boat i's manoeuvre again against the others' present ones."""
     scene.satisfied[i], scene.score_m[i] = score_path(i, i, WORST, scene)
 
 
 @lean_kernel
 def settled(i: int, sweep: int, done: int, scene: Scene) -> bool:
-    """Whether no other manoeuvre is to be searched for boat i in this sweep, see `assign_manoeuvres`."""
+    """Return whether the search for boat i is over in this sweep, see `assign_manoeuvres`."""
     memory = scene.memory
     was_short = (
         memory[i, W.HAS_BACKUP] > 0.0
@@ -99,7 +99,7 @@ def settled(i: int, sweep: int, done: int, scene: Scene) -> bool:
 
 @lean_kernel
 def hold(i: int, held: Array, scene: Scene) -> None:
-    """Note the manoeuvre boat i has from its predicted state: side, heading it ends on (NaN: no turn), speed."""
+    """Note boat i's manoeuvre as seen from its predicted state: side, end heading (NaN: no turn), speed."""
     side, togo = scene.manoeuvre[i, 0], scene.manoeuvre[i, 1]
     held[i, 0], held[i, 2] = side, scene.manoeuvre[i, 2]
     held[i, 1] = scene.next_state[i, L.HEADING] + math.copysign(togo, side) if togo > 0.0 else np.nan
@@ -107,7 +107,7 @@ def hold(i: int, held: Array, scene: Scene) -> None:
 
 @lean_kernel
 def _continue_manoeuvre(i: int, scene: Scene) -> None:
-    """Lay the path of boat i on the manoeuvre in ``scene.held`` from its predicted state."""
+    """Roll out the manoeuvre in ``scene.held`` of boat i from its predicted state."""
     held = scene.held
     togo = found_turn(i, scene.next_state[i, L.HEADING], held)
     roll_out(i, i, held[i, 0], togo, held[i, 2], 1, scene)
@@ -115,7 +115,7 @@ def _continue_manoeuvre(i: int, scene: Scene) -> None:
 
 @lean_kernel
 def rate(scene: Scene) -> None:
-    """Rate the plans of all boats of ours again."""
+    """Score the manoeuvres of all own boats again."""
     for i in range(scene.ours.shape[0]):
         if scene.ours[i]:
             refresh(i, scene)
@@ -123,7 +123,7 @@ def rate(scene: Scene) -> None:
 
 @lean_kernel
 def recheck(scene: Scene) -> None:
-    """Rate all boats of ours when movers carry out ``scene.held`` from newly predicted states."""
+    """Score all own boats when movers carry out ``scene.held`` from newly predicted states."""
     for i in range(scene.ours.shape[0]):
         if scene.moving[i]:
             _continue_manoeuvre(i, scene)
@@ -132,7 +132,7 @@ def recheck(scene: Scene) -> None:
 
 @lean_kernel
 def roll_out_first(scene: Scene, done: int, who: BoolArray) -> None:
-    """Give each boat of ``who`` the manoeuvre to begin with: the one in memory, else the first of the family."""
+    """Give each boat of ``who`` a first manoeuvre: the remembered one, else the first of the family."""
     state = scene.state
     for i in range(state.shape[0]):
         if who[i] and scene.reason[i] == W.STOPPED:
@@ -148,14 +148,14 @@ def roll_out_first(scene: Scene, done: int, who: BoolArray) -> None:
 def assign_manoeuvres(scene: Scene, done: int, who: BoolArray) -> bool:
     """Give the boats of ``who`` a manoeuvre from their predicted (done = 1) or present states (0).
 
-    From predicted ones that is the first that is safe, from present ones, which are carried out, the best.
-    Boats of ours outside ``who`` keep the paths they have. One step on, a boat that was on its backup is only
-    offered that if it was short of its margin, since what all manoeuvres could not do a step ago is not searched twice,
-    or if it now is short of static constraints alone. Nor is a boat whose trouble are pursuers, which the others'
-    manoeuvres do not change.
+    From predicted states the first safe manoeuvre is taken; from present ones, which are carried out, the best. Own
+    boats outside ``who`` keep their paths. Some boats are not searched again one step ahead. A boat on its backup is
+    offered only that backup if its margin was violated (a step ago no manoeuvre did better), or if it now violates
+    static constraints alone. Nor is a boat searched that violates margins from pursuers: the other boats' manoeuvres
+    do not change those.
 
     Returns:
-        Whether all boats of ours keep clear of all boats and of static constraints.
+        Whether all own boats stay clear of all boats and of static constraints.
     """
     state, ours = scene.state, scene.ours
     n = state.shape[0]

@@ -1,4 +1,4 @@
-"""What a backup manoeuvre is worth: what it keeps, in the order of what matters, and then by how much."""
+"""The lexicographic score of a backup manoeuvre: which constraints it satisfies, then by what margin."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ SAME_M = 1e-6
 
 
 class Rank(NamedTuple):
-    """What a manoeuvre is worth; more is better, entry by entry.
+    """Score of a manoeuvre; more is better, entry by entry.
 
     Attributes:
-        satisfied: the last thing it satisfies, `NOTHING` to `ALL`.
-        score_m: decides between those that keep as much, m: of `NOTHING` and `OBSTACLES` the least margin from boats,
-            of `BOATS` that from obstacles, of `OPPONENTS` that from static constraints less what must be kept, and of
-            `ALL` what is to spare from boats.
+        satisfied: the last level that is satisfied, `NOTHING` to `ALL`.
+        score_m: decides within a level, m. For `NOTHING` and `OBSTACLES`: the least margin from boats. For `BOATS`: the
+            margin from obstacles. For `OPPONENTS`: the margin from static constraints less the required one. For `ALL`:
+            the margin to spare from boats.
     """
 
     satisfied: int
@@ -45,7 +45,7 @@ WORST = Rank(NOTHING, -1e9)
 
 @lean_kernel
 def better(rank: Rank, best: Rank) -> bool:
-    """Whether a rank is above another by more than rounding."""
+    """Return whether a score exceeds another by more than rounding."""
     return rank.satisfied > best.satisfied or (
         rank.satisfied == best.satisfied and rank.score_m > best.score_m + SAME_M
     )
@@ -53,13 +53,13 @@ def better(rank: Rank, best: Rank) -> bool:
 
 @lean_kernel
 def score_of(i: int, scene: Scene) -> Rank:
-    """Rank of the manoeuvre boat i has."""
+    """Return the score of boat i's present manoeuvre."""
     return Rank(scene.satisfied[i], scene.score_m[i])
 
 
 @lean_kernel
 def level_to_beat(best: Rank) -> float:
-    """Margin against pursuers, m, at which a manoeuvre short of what it must keep is no better than the best."""
+    """Return the margin against pursuers, m, at which a manoeuvre that violates it is no better than the best."""
     if best.satisfied > OBSTACLES:
         return FAR
     return best.score_m if best.satisfied == OBSTACLES else -FAR
@@ -67,7 +67,7 @@ def level_to_beat(best: Rank) -> float:
 
 @lean_kernel
 def least_to_beat(best: Rank) -> float:
-    """Margin, m, below which a manoeuvre is no better than the best, whatever else it keeps."""
+    """Return the margin, m, below which a manoeuvre is no better than the best, whatever else it satisfies."""
     return best.score_m + SAME_M if best.satisfied == ALL else -FAR
 
 
@@ -80,7 +80,7 @@ def is_no_better(i: int, slot: int, best: Rank, scene: Scene) -> bool:
 
 @lean_kernel
 def _skip_pursuers(slot: int, scene: Scene) -> None:
-    """Margins against pursuers of a path of which they do not matter: none is better than that from the others."""
+    """Set margins of a path whose pursuers do not matter: none exceeds the margin from the other boats."""
     margin = scene.clear[slot, MARGIN]
     scene.threat_m[slot], scene.threats_m[slot, :], scene.joint_m[slot] = margin, margin, FAR
     scene.refused_by_table[slot], scene.pursuers_known[slot] = False, False
@@ -101,11 +101,11 @@ def _rank_if_clear(i: int, slot: int, scene: Scene) -> Rank:
 
 @lean_kernel
 def score_path(i: int, slot: int, best: Rank, scene: Scene) -> Rank:
-    """Rank of the path in ``slot`` for boat i; work is cut short once it cannot exceed ``best``.
+    """Score the path in ``slot`` for boat i; stop early once it cannot exceed ``best``.
 
-    What is certain comes before what is feared: teammates and opponents that hold their course first, obstacles near
-    in time second (who is stopped is caught), pursuing opponents third; then all static constraints, and last room to
-    spare. The clearance told is from all boats, whatever the rank hangs on.
+    Certain constraints come before adversarial ones: first teammates and opponents that hold their course, then
+    obstacles near in time (a stopped boat is caught), then pursuing opponents, then all static constraints, last the
+    margin to spare. The reported clearance is from all boats, whatever decides the score.
     """
     scene.spent[0] += scene.cost[i]
     clear = scene.clear[slot]
@@ -143,7 +143,7 @@ def score_path(i: int, slot: int, best: Rank, scene: Scene) -> Rank:
 
 @lean_kernel
 def all_satisfy(least: int, scene: Scene) -> bool:
-    """Whether every boat of ours keeps at least that much."""
+    """Return whether every own boat satisfies at least that level."""
     ours = scene.ours
     keep = True
     for i in range(ours.shape[0]):

@@ -1,4 +1,4 @@
-"""Laying a manoeuvre of a boat into a slot of the working memory: where it is looked up, and its path."""
+"""Manoeuvre rollout: a manoeuvre's path goes into a slot of the scene, with the place at which tables look it up."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ the end of the pursuit."""
 
 @lean_kernel
 def pursuit_extent(i: int, slot: int, scene: Scene) -> int:
-    """How far opponents near boat i are to be run through as pursuers, which takes a longer path."""
+    """Return how far opponents near boat i must be rolled out as pursuers, which takes a longer path."""
     boats = scene.boats
     if not scene.pursued[i] or boats.table_steps[i] == 0:
         return PURSUERS if scene.pursued[i] else NO_PURSUERS
@@ -34,7 +34,7 @@ def pursuit_extent(i: int, slot: int, scene: Scene) -> int:
 
 @lean_kernel
 def _roll_out_command(i: int, slot: int, scene: Scene) -> None:
-    """Write where boat i is during the step it is predicted for, as far as that is of several moves."""
+    """Write boat i's positions during the predicted step, where that has several moves."""
     state, boats, tuning = scene.state, scene.boats, scene.tuning
     if tuning.moves == 1:
         return

@@ -1,15 +1,15 @@
-"""Where the nominal commands do not keep everything: the backups, a joint plan for all boats of ours.
+"""The backups: where a nominal command fails the check, boats switch to a verified joint plan.
 
-A command is sent only with a verified joint plan behind it: a manoeuvre for every boat of ours that keeps clear of
-everything from the state one step after it. When the nominal commands have none, the plan of the last decision is gone
-on with, or a better one. So a verified plan, once there, is there at every step, unless an opponent does what none was
-asked to keep clear of.
+Every command that is sent has a verified joint plan behind it: for each own boat, a manoeuvre that stays clear of
+everything from the state one step ahead. If the nominal commands have no such plan, the boats continue the last one or
+take a better one. So a verified plan, once found, exists at every step, unless an opponent does what no manoeuvre had
+to allow for.
 
-Before opponents backups are carried out in full: of those who do not decide with us too little is known. One that is
-only just kept off is so again in the next step, and a boat that gives way as little as it may in each gives way for
-longer. Of other backups as little is carried out as will do, see `qp` and `blend`.
+Against opponents the shield sends the whole backup, because too little is known of boats that others command: minimal
+changes prolonged the encounters in which they were tried. Other backups are reduced to the least change, see `qp` and
+`blend`.
 
-That is the switching of backup filters: Gurriet et al. 2020 (IEEE Access 8), Agrawal, Chen, Panagou 2024 (gatekeeper).
+The switching is that of backup filters: Gurriet et al. 2020 (IEEE Access 8), Agrawal, Chen, Panagou 2024 (gatekeeper).
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from .nominal import check
 
 @lean_kernel
 def pick_movers(scene: Scene) -> int:
-    """Boats whose certificate fails, and the teammates it fails against; once in, a boat stays in."""
+    """Pick the boats whose nominal command fails, and the teammates it fails against; a mover stays one."""
     ours = scene.ours
     n = ours.shape[0]
     for i in range(n):
@@ -49,7 +49,7 @@ def pick_movers(scene: Scene) -> int:
 
 @lean_kernel
 def list_movers(scene: Scene) -> int:
-    """List the boats marked as movers, and number them; returns how many they are."""
+    """List and number the movers; return how many there are."""
     count = 0
     for i in range(scene.moving.shape[0]):
         scene.mover_of[i] = -1
@@ -61,7 +61,7 @@ def list_movers(scene: Scene) -> int:
 
 @lean_kernel
 def _slack_of(i: int, scene: Scene) -> float:
-    """What boat i is short of its distance from boats and static constraints, m."""
+    """Return by how much boat i violates its distance from boats and static constraints, m."""
     least = reported_margin(i, scene)
     if scene.satisfied[i] >= OPPONENTS:
         least = min(least, scene.static_clear[i, MARGIN])
@@ -73,7 +73,7 @@ def _slack_of(i: int, scene: Scene) -> float:
 
 @lean_kernel
 def command_backup(i: int, scene: Scene) -> None:
-    """Make boat i's command and plan those of its backup: the first step of it, through the autopilot's inverse."""
+    """Command the first step of boat i's backup, through the inverse of its autopilot."""
     state, boats, tuning = scene.state, scene.boats, scene.tuning
     side, togo, speed = scene.manoeuvre[i, 0], scene.manoeuvre[i, 1], scene.manoeuvre[i, 2]
     scene.held[i, 0], scene.held[i, 1], scene.held[i, 2] = side, np.nan, speed
@@ -86,7 +86,7 @@ def command_backup(i: int, scene: Scene) -> None:
 
 @lean_kernel
 def _score_without_passed(i: int, slot: int, scene: Scene) -> Rank:
-    """Rank of boat i's path in ``slot`` if teammates whose nominal commands passed were not there."""
+    """Score boat i's path in ``slot`` as if teammates whose nominal commands passed were absent."""
     ours = scene.ours
     for j in range(ours.shape[0]):
         if ours[j] and not scene.moving[j]:
@@ -100,9 +100,9 @@ def _score_without_passed(i: int, slot: int, scene: Scene) -> Rank:
 
 @lean_kernel
 def _passed_block(count: int, scene: Scene) -> bool:
-    """Whether some mover would keep more if teammates whose nominal commands passed were not there.
+    """Return whether a mover would score better without the teammates whose nominal commands passed.
 
-    A boat that opponents or static constraints leave no way out is helped by nobody who gives up what was wanted.
+    A boat that opponents or static constraints leave no way out is not helped by a teammate that gives up its command.
     """
     state = scene.state
     trial = state.shape[0]
@@ -124,7 +124,7 @@ def _passed_block(count: int, scene: Scene) -> bool:
 
 @lean_kernel
 def _join(scene: Scene) -> int:
-    """Make movers of the boats of ours that could meet movers; returns how many movers there are."""
+    """Make movers of own boats that could meet movers; return the number of movers."""
     ours = scene.ours
     for i in range(ours.shape[0]):
         for m in range(ours.shape[0]):
@@ -135,7 +135,7 @@ def _join(scene: Scene) -> int:
 
 @lean_kernel
 def _join_short(scene: Scene) -> int:
-    """Make movers of the boats of ours that passed and that the movers' backups come too near; returns as `_join`."""
+    """Make movers of own boats that passed and that the movers' backups come too near; return the number of movers."""
     ours = scene.ours
     for i in range(ours.shape[0]):
         if ours[i] and scene.satisfied[i] < OBSTACLES:
@@ -145,7 +145,10 @@ def _join_short(scene: Scene) -> int:
 
 @lean_kernel
 def _assign_backups(count: int, scene: Scene) -> bool:
-    """Backups of the movers from the present state; whether all boats of ours then keep clear."""
+    """Find backups of the movers from the present state; return whether all own boats then stay clear.
+
+    Opponents are left where boats with tables look them up on such manoeuvres.
+    """
     ours, boats = scene.ours, scene.boats
     table_steps = 1
     for i in range(ours.shape[0]):
@@ -163,11 +166,11 @@ def _assign_backups(count: int, scene: Scene) -> bool:
 
 @lean_kernel
 def _find_backups(count: int, scene: Scene) -> None:
-    """Make the candidate of all movers' backups and check it.
+    """Make a candidate of all movers' backups and check it.
 
-    All boats of ours had backups that fit at the last decision, and these are tried first. Those of the movers need not
-    fit what boats have whose nominal commands passed: where these are in the way, or are themselves too near them, they
-    take part, too.
+    All own boats had backups that fit at the last decision; these are tried first. The movers' backups may conflict
+    with boats whose nominal commands passed. If these block a mover, or are too near to one, they become movers as
+    well.
     """
     ours = scene.ours
     for _ in range(ours.shape[0]):
@@ -185,10 +188,10 @@ def _find_backups(count: int, scene: Scene) -> None:
 
 @lean_kernel
 def back_up(scene: Scene) -> None:
-    """Make backups the commands of the boats that are short of something, and of those in whose way these are.
+    """Make backups the commands of boats that violate something, and of boats that block them.
 
-    The reason is BACKUP, of boats that are short of something all the same BEST_EFFORT: avoidance does not switch
-    itself off.
+    The reason is BACKUP, or BEST_EFFORT where the backup still violates something: the shield never switches itself
+    off.
     """
     ours = scene.ours
     _find_backups(pick_movers(scene), scene)

@@ -1,8 +1,8 @@
-"""What the backups come to, verified by the full model, and what an answer may cost of that.
+"""The line search between backup and nominal command; every candidate is held against the verified backup's score.
 
-Backups are a joint plan, see `backup_switch`. From it on what is nearer to the nominal commands is taken, an answer of
-the program or a part of a backup, if no boat then keeps less than after its backup. Who uses up its margin to give way
-as little as may be gives way for longer.
+Backups are a joint plan, see `backup_switch`. A command nearer to the nominal one, from the QP or from a blend, is
+accepted only if no boat then scores below its verified backup. A boat that spent its margin on smaller changes would
+have to give way for longer.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ LITTLE_M = 0.001
 
 @lean_kernel
 def note_verified(scene: Scene) -> None:
-    """Note the commands that have just been checked, and the rank of each boat's backup after them."""
+    """Note the commands just checked, and each boat's score on its backup after them."""
     state, ours = scene.state, scene.ours
     for i in range(ours.shape[0]):
         if ours[i]:
@@ -36,9 +36,9 @@ def note_verified(scene: Scene) -> None:
 
 @lean_kernel
 def verify(static_rate: bool, scene: Scene) -> None:
-    """Rate what has been checked by what must be kept when commands are screened, and note it.
+    """Score the commands just checked against the required margins of the nominal check, and note the result.
 
-    Without ``static_rate`` of static constraints only their distance is asked for.
+    Without ``static_rate``, static constraints require only their distance, not their class-K rate.
     """
     set_required_margins(scene)
     if not static_rate:
@@ -49,26 +49,26 @@ def verify(static_rate: bool, scene: Scene) -> None:
 
 @lean_kernel
 def satisfies_all(i: int, scene: Scene) -> bool:
-    """Whether boat i's backup keeps everything."""
+    """Return whether boat i's backup satisfies all constraints."""
     return int(scene.verified[i, SATISFIED]) == ALL
 
 
 @lean_kernel
 def before_opponent(i: int, scene: Scene) -> bool:
-    """Whether an opponent is in the way of what boat i wants."""
+    """Return whether boat i's nominal command violates the margin from an opponent."""
     cause = scene.violated[i]
     return cause >= 0 and not scene.ours[cause]
 
 
 @lean_kernel
 def restore_verified(i: int, scene: Scene) -> None:
-    """Make boat i's command the verified one again."""
+    """Make the verified command boat i's command again."""
     scene.command[i, 0], scene.command[i, 1] = scene.verified[i, SPEED], scene.verified[i, HEADING]
 
 
 @lean_kernel
 def costs_at_most(most_m: float, scene: Scene) -> bool:
-    """Whether no boat keeps less after the commands just checked, or, of those that keep everything, less by that."""
+    """Return whether no boat scores below its verified backup, by more than ``most_m`` where all is satisfied."""
     ours, verified = scene.ours, scene.verified
     within = True
     for i in range(ours.shape[0]):
@@ -87,9 +87,9 @@ TRIALS = 3
 
 @lean_kernel
 def _mildest_turn(i: int, scene: Scene) -> float:
-    """Turn, deg: the wanted one where it is a part of the backup's, straight on where it goes against it.
+    """Return the turn nearest to the nominal one, deg: 0 where nominal turn and backup go to opposite sides.
 
-    As much against it as is allowed in this step would have to be taken back in the next.
+    A turn against the backup would have to be undone in the next step.
     """
     wanted, backup = scene.checked_turn[i], scene.verified[i, TURN]
     if wanted * backup <= 0.0:
@@ -99,7 +99,7 @@ def _mildest_turn(i: int, scene: Scene) -> float:
 
 @lean_kernel
 def _give_back(share: float, i: int, scene: Scene) -> None:
-    """Command of boat i that share of the way from its backup to the wanted one; all of it is that, bit for bit."""
+    """Blend boat i's command: ``share`` of the way from backup to nominal; all of it is the nominal command exactly."""
     state, boats, tuning = scene.state, scene.boats, scene.tuning
     backup, mildest = scene.verified[i], _mildest_turn(i, scene)
     if share == 1.0 and mildest == scene.checked_turn[i]:
@@ -114,7 +114,7 @@ def _give_back(share: float, i: int, scene: Scene) -> None:
 
 @lean_kernel
 def _blend_one(i: int, scene: Scene) -> None:
-    """Bring boat i's command as near to the wanted one as costs no boat of ours anything."""
+    """Move boat i's command as near to the nominal one as no own boat's score allows to notice."""
     kept, too_far, at = 0.0, 2.0, 0.0
     scene.solver[i] = BY_LINE_SEARCH
     scene.moving[:] = False
@@ -140,13 +140,13 @@ def _blend_one(i: int, scene: Scene) -> None:
 
 @lean_kernel
 def _may_be_blended(i: int, scene: Scene) -> bool:
-    """Whether boat i backs up before no opponent: of these too little is known, see `backup_switch`."""
+    """Return whether boat i is on a backup from something other than an opponent, see `backup_switch`."""
     return scene.ours[i] and scene.reason[i] == BACKUP and not before_opponent(i, scene)
 
 
 @lean_kernel
 def any_may_be_blended(scene: Scene) -> bool:
-    """Whether some boat may be."""
+    """Return whether any boat may be blended."""
     found = False
     for i in range(scene.ours.shape[0]):
         found = found or _may_be_blended(i, scene)
@@ -155,11 +155,11 @@ def any_may_be_blended(scene: Scene) -> bool:
 
 @lean_kernel
 def blend(scene: Scene) -> None:
-    """Take back of backups, boat by boat, what is not needed to keep what they keep.
+    """Blend the backups, boat by boat, as far as every boat still satisfies what it satisfies on its backup.
 
-    Margins from boats are those that have to be kept, as when the nominal commands were screened; backups that do not
-    keep them are carried out as they are. Of static constraints only their distance is asked for, but of boats between
-    these and teammates: who uses up its room there has none left to make for others.
+    Required margins are those of the nominal check; a backup that does not satisfy them is sent whole. Static
+    constraints require only their distance, except between such a constraint and a teammate: there a boat must keep
+    room for others.
     """
     for i in range(scene.ours.shape[0]):
         if _may_be_blended(i, scene) and satisfies_all(i, scene) and not all_spent(scene):

@@ -1,7 +1,7 @@
-"""Groups of boats of ours that can matter to each other: what is not passed is decided group by group.
+"""Groups of own boats that can meet: what does not pass is decided group by group.
 
-Two boats are of one group if they could meet, or both could meet boats of it (`barriers.neighbours`). A decision for
-one group does not hang on others: what befalls a teammate far away changes nothing, and many boats are many small
+Two boats are in one group if they could meet, or could both meet boats of that group (`barriers.neighbours`). A
+group's decision does not depend on other groups: a teammate far away changes nothing, and many boats make many small
 problems.
 """
 
@@ -17,7 +17,7 @@ NOT_OURS, NONE, NOT_YET = -1, -2, -3
 
 @lean_kernel
 def _gather(first: int, group: int, scene: Scene) -> bool:
-    """Give a number to boat ``first`` and to all who are of its group; whether any of them is short of something."""
+    """Number boat ``first`` and its whole group; return whether any of them violates something."""
     ours, groups, queue = scene.ours, scene.group, scene.movers
     groups[first], queue[0] = group, first
     done, found, short = 0, 1, False
@@ -37,7 +37,7 @@ def _gather(first: int, group: int, scene: Scene) -> bool:
 
 @lean_kernel
 def make_groups(scene: Scene) -> int:
-    """Number, in ``scene.group``, the groups in which a nominal command is short of something; returns how many."""
+    """Number, in ``scene.group``, the groups in which a nominal command fails; return how many."""
     ours, groups = scene.ours, scene.group
     for i in range(ours.shape[0]):
         groups[i] = NOT_YET if ours[i] else NOT_OURS
@@ -50,7 +50,7 @@ def make_groups(scene: Scene) -> int:
 
 @lean_kernel
 def open_group(group: int, scene: Scene) -> None:
-    """Make the boats of one group those that are decided for."""
+    """Decide only for the boats of one group, from now on."""
     ours, groups = scene.ours, scene.group
     for i in range(ours.shape[0]):
         ours[i] = groups[i] == group
@@ -59,6 +59,6 @@ def open_group(group: int, scene: Scene) -> None:
 
 @lean_kernel
 def close_groups(scene: Scene) -> None:
-    """Make all boats of ours those that are decided for again."""
+    """Decide for all own boats again."""
     for i in range(scene.ours.shape[0]):
         scene.ours[i] = scene.group[i] != NOT_OURS

@@ -1,6 +1,6 @@
-"""The nominal check: whether the nominal commands can be sent as they are; and the exact check of any candidate.
+"""The nominal check: may the nominal commands be sent as they are? And the exact check of any candidate command.
 
-Both predict one step by the full model, and rate what each boat then satisfies on its backup from there.
+Both predict one step with the full model, then score the backup that each boat has from there.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ..workspace import Scene
 
 @lean_kernel
 def predict(i: int, commands: Array, scene: Scene) -> None:
-    """State of boat i one step after its command, by the full boat and autopilot model."""
+    """Predict the state of boat i one step after its command, with the full boat and autopilot model."""
     state, boats, tuning = scene.state, scene.boats, scene.tuning
     copy_row(scene.next_state[i], state[i])
     copy_row(scene.stepped[i], commands[i])
@@ -31,7 +31,7 @@ def predict(i: int, commands: Array, scene: Scene) -> None:
 
 @lean_kernel
 def check(scene: Scene) -> None:
-    """Predict the movers, and rate what each boat then keeps on the manoeuvre in ``scene.held``."""
+    """Predict the movers, and score every boat on the manoeuvre in ``scene.held``."""
     for i in range(scene.ours.shape[0]):
         if scene.moving[i]:
             predict(i, scene.command, scene)
@@ -40,7 +40,7 @@ def check(scene: Scene) -> None:
 
 @lean_kernel
 def _largest_tabled_m(i: int, j: int, scene: Scene) -> float:
-    """Largest margin, m, a table can tell of a pair: beyond it the margin is said to be infinite."""
+    """Return the largest margin, m, that a table reports for a pair; beyond it a table reports infinity."""
     boats = scene.boats
     table = boats.table[i, j]
     if table < 0:
@@ -50,18 +50,19 @@ def _largest_tabled_m(i: int, j: int, scene: Scene) -> float:
 
 @lean_kernel
 def _required_m(decay: float, was_m: float, cap_m: float) -> float:
-    """Margin, m, that is asked for of one that was ``was_m``, capped: the class-K rate of a step, but never below 0."""
+    """Return the margin, m, required one step after ``was_m``: the class-K rate, capped, never below 0."""
     return decay * max(0.0, min(was_m, cap_m))
 
 
 @lean_kernel
 def set_required_margins(scene: Scene) -> None:
-    """Margins each boat must keep: the discrete-time class-K condition h(x+) >= decay * min(h(x), cap), at least 0.
+    """Set the required margins: the discrete-time class-K condition h(x+) >= decay * min(h(x), cap), at least 0.
 
-    What is feared of opponents has its own, of each: beside a teammate, whose margin is small and sure, it would else
-    be let go at once. That from teammates of ours shrinks freely until it is small: what they will do is known.
+    Each adversarial opponent has a required margin of its own. In a common one, a teammate's small but certain margin
+    would let it shrink at once. The margin from own teammates may shrink freely until it is small: their commands are
+    known.
 
-    A boat that dwells on its backup gives nothing of it away: all there may be is asked for.
+    While a boat holds its backup, its margins may not shrink at all.
     """
     ours, boats, tuning, memory = scene.ours, scene.boats, scene.tuning, scene.memory
     for i in range(ours.shape[0]):
@@ -86,10 +87,10 @@ def set_required_margins(scene: Scene) -> None:
 
 @lean_kernel
 def screen(scene: Scene) -> bool:
-    """Check the nominal commands as they are; True when every boat still has its backup after them.
+    """Check the nominal commands; return True when every boat still has its backup after them.
 
-    An unusable command (NaN, infinite or beyond `LARGEST_COMMAND`), or one of a boat of whose place a registered
-    barrier tells nothing, is replaced by holding course at zero speed before the check.
+    A command that is not usable (NaN, infinite, beyond `LARGEST_COMMAND`) becomes: hold course at zero speed. So does
+    the command of a boat for whose position a registered barrier reports nothing.
     """
     state, ours = scene.state, scene.ours
     n, wanted = state.shape[0], scene.nominal
