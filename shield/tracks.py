@@ -1,4 +1,4 @@
-"""Tracks made ready for a decision: memory filled in, age and delay run on."""
+"""Tracks made ready for a decision: memory filled in, positions extrapolated through age and delay."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .workspace import BACKUP_MARGIN, BLOCKED_BY, LARGEST_COMMAND, N_MEMORY, Sce
 
 @kernel
 def fill_memory(state: Array, params: Array) -> None:
-    """Replace unknown (NaN) thrust by the one that holds the speed, unknown rudder and integrals by 0; in place."""
+    """Replace unknown (NaN) thrust by the thrust that holds the speed, unknown rudder and integrals by 0; in place."""
     for i in range(state.shape[0]):
         if math.isnan(state[i, L.THRUST]):
             state[i, L.THRUST] = thrust_at(params[i], state[i, L.SPEED])
@@ -27,7 +27,7 @@ def fill_memory(state: Array, params: Array) -> None:
 
 @kernel
 def thrust_at(params: Array, speed_mps: float) -> float:
-    """Thrust, percent, that holds a straight-line speed, m/s; the thrust map's end beyond it."""
+    """Return the thrust, percent, that holds a straight-line speed, m/s; beyond the thrust map its end."""
     size = int(params[L.MAP_SIZE])
     for k in range(1, size):
         low, high = params[L.MAP_SPEED + k - 1], params[L.MAP_SPEED + k]
@@ -86,7 +86,7 @@ def queue_commands(pending: Array, state: Array, commands: Array) -> None:
 
 @kernel
 def astern_as_turned_ahead(state: Array, controlled: BoolArray) -> None:
-    """Make boats not ours that go astern go ahead the same way, in place: others' courses are followed ahead."""
+    """Turn other boats that go astern round, in place, so that they go ahead the same way."""
     for i in range(state.shape[0]):
         if not controlled[i] and state[i, L.SPEED] < 0.0:
             state[i, L.HEADING] = state[i, L.HEADING] % 360.0 - 180.0
@@ -94,17 +94,17 @@ def astern_as_turned_ahead(state: Array, controlled: BoolArray) -> None:
 
 
 def whole_steps(time_s: float, dt_s: float) -> int:
-    """Steps that a time takes, counted up but for its rounding."""
+    """Return the number of steps that a time takes, rounded up but for rounding errors."""
     return math.ceil(time_s / dt_s - 1e-9)
 
 
 def steps_of_delay(config: ShieldConfig) -> int:
-    """Decisions whose commands are on their way at any time."""
+    """Return the number of decisions whose commands are on their way at any time."""
     return whole_steps(config.delay_s, config.dt_s)
 
 
 def who_stayed(before: tuple[Any, ...], now: tuple[Any, ...]) -> tuple[IntArray, IntArray]:
-    """Places now and then of boats of the same (name, platform, team); none where two boats have one name."""
+    """Return places now and then of boats of the same (name, platform, team); none if two boats share a name."""
     place = {key: k for k, key in enumerate(before)}
     if any(len({name for name, *_ in keys}) < len(keys) for keys in (before, now)):
         place = {}

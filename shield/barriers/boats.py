@@ -1,13 +1,13 @@
-"""Distance kept from boats whose way is known: teammates on their backups, opponents that hold their course.
+"""The barrier against boats whose way is known: teammates on their backups, opponents that hold their course.
 
 For boat i with backup manoeuvre m (turn to one side, then straight, at a set speed),
 
-    h_i(x) = max over m of min over neighbours j, over what j may do, over t of |p_i(t; m) - p_j(t)| - R_ij,
+h_i(x) = max over m of min over neighbours j, over what j may do, over t of |p_i(t; m) - p_j(t)| - R_ij,
 
-with the boat's own motion from its full model (thrust lag, speed lost in the turn, turn rate bound by thrust). The
-manoeuvre is one for all neighbours of a boat, so rows of different neighbours never contradict each other: the
-manoeuvre itself satisfies them all (backup certificates: Chen, Jankovic, Santillo, Ames 2021). What opponents may do
-beyond holding their course is in `pursuit`.
+with the boat's own motion from its full model (thrust lag, speed lost in the turn, turn rate bound by thrust). One
+manoeuvre serves all neighbours of a boat, so rows of different neighbours never contradict each other: the manoeuvre
+satisfies them all (backup certificates: Chen, Jankovic, Santillo, Ames 2021). What opponents may do beyond holding
+their course is in `pursuit`.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ ROUNDING_M = 1e-6
 
 @lean_kernel
 def reported_margin(i: int, scene: Scene) -> float:
-    """Certificate of boat i as it is told, m; of a boat in breach how far it is inside the radius now (negative)."""
+    """Return the safety margin of boat i as reported, m; inside the separation: minus its depth there now."""
     state = scene.state
     least, in_breach = FAR, False
     for j in range(state.shape[0]):
@@ -56,14 +56,14 @@ def clear_of_boat(i: int, j: int, path: Array, scene: Scene, floor_m: float, cap
 
 @lean_kernel
 def required_margin_m(i: int, j: int, scene: Scene) -> float:
-    """Margin boat i must keep from boat j, whatever else is feared of it, m."""
+    """Return the margin that boat i must keep from boat j if j's way is known, m."""
     ours = scene.ours
     return scene.teammate_target_m[i] if ours[j] else scene.target[i]
 
 
 @lean_kernel
 def worst_clearance(i: int, slot: int, scene: Scene, floor_m: float) -> None:
-    """Worst clearance of boat i on the path in ``slot`` from teammates' paths and opponents' straight courses.
+    """Find the worst clearance of boat i on the path in ``slot`` from teammates' paths and opponents' straight courses.
 
     ``scene.violates_known[slot]`` says whether one of them is below its required margin. Then the constraint that is
     violated by most is active; of margins below 0 the least.

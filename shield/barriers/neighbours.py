@@ -1,4 +1,4 @@
-"""Which pairs of boats can matter to a decision, and what radius each has to keep."""
+"""Which pairs of boats can matter to a decision, and the radius each pair must keep."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ REGAIN_M = 0.01
 
 @lean_kernel
 def find_neighbours(scene: Scene) -> None:
-    """Courses of all boats, and for each pair whether it can matter and which radius holds.
+    """Find the course of every boat, and for each pair whether it can matter and at what radius.
 
-    A pair is left out when its distance exceeds R_ij + (fastest i + fastest j) * (longer horizon + tail). No boat ever
-    exceeds its fastest speed, so on every path the certificate looks at the pair stays apart by more than R_ij: its
-    margin is positive for every manoeuvre and every command, its row can never be the binding one, and leaving it
-    out changes no decision.
+    A pair is left out when its distance exceeds R_ij + (fastest i + fastest j) * (longer horizon + straight run). No
+    boat exceeds its fastest speed, so the pair stays apart by more than R_ij on every path of the backup check. Its
+    margin is then positive for every manoeuvre and command, its row can never be active, and leaving it out changes no
+    decision.
 
-    The radius is the separation with error margins and buffer. A pair already inside the buffer must come apart
-    again; one inside the separation itself is in breach.
+    The radius is the separation with error margins and buffer. A pair inside the buffer must part again. A pair inside
+    the separation itself violates it.
     """
     scene.spent[0], scene.cut_short[0] = 0.0, False
     scene.cost[:] = PATH_COST
@@ -43,7 +43,7 @@ def find_neighbours(scene: Scene) -> None:
 
 @lean_kernel
 def _note_course(i: int, scene: Scene) -> None:
-    """Note where boat i is one step on if it holds its course, before its neighbours are looked at."""
+    """Note where boat i is one step ahead if it holds its course, before its neighbours are looked at."""
     row, course = scene.state[i], scene.course[i]
     scene.pursued[i], scene.first_pursuer[i] = False, 0
     scene.first_rudder[i, :] = 0
@@ -55,7 +55,7 @@ def _note_course(i: int, scene: Scene) -> None:
 
 @lean_kernel
 def _note_pair(i: int, j: int, scene: Scene) -> None:
-    """Note whether two boats can matter to each other, at what radius, and what looking at them costs."""
+    """Note whether two boats can matter to each other, at what radius, and what checking them costs."""
     state, boats, tuning = scene.state, scene.boats, scene.tuning
     top = max(boats.fastest_mps[i], state[i, L.SPEED]) + max(boats.fastest_mps[j], state[j, L.SPEED])
     opponents = boats.team[i] != boats.team[j]
@@ -84,10 +84,10 @@ def _note_pair(i: int, j: int, scene: Scene) -> None:
 
 @lean_kernel
 def _reach_samples(i: int, scene: Scene) -> int:
-    """Samples over which opponents of boat i may be followed.
+    """Return the number of samples over which opponents of boat i may be followed.
 
-    One whose thrust stays enough for the next step, whatever is commanded, is followed as boats are that have all of
-    theirs; so is one that is not ours, whose manoeuvres nobody looks at.
+    A boat whose thrust suffices for the next step, whatever is commanded, counts as one at full thrust. So does a boat
+    that is not own: nobody looks at its manoeuvres.
     """
     state, ours, boats, tuning = scene.state, scene.ours, scene.boats, scene.tuning
     if not ours[i]:
@@ -117,10 +117,10 @@ def error_to(row: Array, x: float, y: float) -> float:
 
 @lean_kernel
 def note_predicted(given: Array, scene: Scene) -> None:
-    """Note which boats' ways are predicted by what drives them, see `Fleet.driven`.
+    """Note which boats are predicted by what drives them, see `Fleet.driven`.
 
-    That takes a speed that a boat can have, and a whole place or none: half a place would be foreseen as no number at
-    all, from which everything keeps clear. And it must last as long as the longest backup manoeuvre.
+    This needs a speed that a boat can have, and a whole position or none: half a position would predict NaN, from
+    which everything stays clear. It must also last as long as the longest backup manoeuvre.
     """
     ours, boats = scene.ours, scene.boats
     last = 0
@@ -137,14 +137,14 @@ def note_predicted(given: Array, scene: Scene) -> None:
 
 @lean_kernel
 def may_pursue(j: int, scene: Scene) -> bool:
-    """Whether boat j as an opponent is granted more than holding its course, or the way that is foreseen."""
+    """Return whether opponent j may do more than hold its course or follow its predicted way."""
     boats = scene.boats
     return boats.granted_turn_dps[j] > 0.0 and not scene.known[j]
 
 
 @lean_kernel
 def _near_ours(j: int, scene: Scene) -> bool:
-    """Whether boat j can matter to a boat of ours."""
+    """Return whether boat j can matter to an own boat."""
     near = False
     for i in range(scene.ours.shape[0]):
         near = near or (scene.ours[i] and scene.near[i, j])
@@ -153,9 +153,9 @@ def _near_ours(j: int, scene: Scene) -> bool:
 
 @lean_kernel
 def predict_game_controlled(scene: Scene) -> None:
-    """Write the ways of boats of ``scene.known`` into ``scene.path``: sample 0 is one step of the model from now.
+    """Predict boats of ``scene.known`` into ``scene.path``; sample 0 is one step of the model ahead.
 
-    They are written as far as anybody looks at them: near boats of ours, as long as the longest of backup manoeuvres.
+    Only boats near own ones are predicted, as long as the longest backup manoeuvre.
     """
     state, boats, tuning = scene.state, scene.boats, scene.tuning
     last = 0

@@ -1,4 +1,4 @@
-"""The worst of what opponents may do against a boat: rolled out as pursuers, or looked up where a table answers."""
+"""The worst that opponents may do to a boat: rolled out as pursuers, or looked up where a value table answers."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ ROUNDING_M = 1e-6
 
 
 class Pursuit(NamedTuple):
-    """For how long a pursuer is followed, and what that comes to."""
+    """For how long a pursuer is followed, and what follows from that."""
 
     samples: int  # the last
     adverse: int  # sample from which on it holds its course and speed
@@ -49,7 +49,7 @@ class Pursuit(NamedTuple):
 
 @lean_kernel
 def closing(i: int, j: int, scene: Scene) -> float:
-    """Most the distance of a pair can shrink from sample to sample, m."""
+    """Return the most by which the distance of a pair can shrink from sample to sample, m."""
     state, boats = scene.state, scene.boats
     top_i = max(boats.fastest_mps[i], state[i, L.SPEED])
     top_j = max(boats.fastest_mps[j], state[j, L.SPEED])
@@ -138,7 +138,7 @@ def _never_near(i: int, j: int, slot: int, lasts: int, scene: Scene) -> bool:
 
 @lean_kernel
 def _fastest_mps(j: int, scene: Scene) -> float:
-    """Speed that opponent j does not exceed as a pursuer."""
+    """Return the speed that opponent j does not exceed as a pursuer."""
     return max(scene.boats.params[j, L.MAX_SPEED], scene.state[j, L.SPEED])
 
 
@@ -185,7 +185,7 @@ def _note_turns(j: int, rudder: int, scene: Scene) -> None:
 
 @lean_kernel
 def _begin_run(j: int, run: Array, own: Array, scene: Scene) -> None:
-    """Put a run of opponent j where it is one step on."""
+    """Place a run of opponent j where j is one step ahead."""
     copy_row(run, scene.course[j])
     run[W.RUN_SPEED], run[W.RUN_WORST], run[W.RUN_WEIGHT] = scene.state[j, L.SPEED], scene.tuning.margin_cap_m, 1.0
     run[W.RUN_TO_X], run[W.RUN_TO_Y] = own[0, 0] - run[W.RUN_X], own[0, 1] - run[W.RUN_Y]
@@ -338,7 +338,7 @@ def _clear_of_threat(i: int, j: int, slot: int, level_m: float, least_m: float, 
 
 @lean_kernel
 def _falls_short(i: int, slot: int, scene: Scene) -> bool:
-    """Whether a margin against pursuers on the path in ``slot`` is short of what boat i must keep."""
+    """Return whether a margin against pursuers on the path in ``slot`` is below the required one."""
     short = scene.outnumbered[i] and not scene.joint_m[slot] >= scene.joint_target_m[i]
     for j in range(scene.ours.shape[0]):
         short = short or not scene.threats_m[slot, j] >= scene.threat_target_m[i, j]
@@ -347,7 +347,7 @@ def _falls_short(i: int, slot: int, scene: Scene) -> bool:
 
 @lean_kernel
 def _may_harm(i: int, j: int, scene: Scene) -> bool:
-    """Whether boat j is an opponent that is looked at as a pursuer of boat i."""
+    """Return whether boat j is an opponent that counts as a pursuer of boat i."""
     team, near = scene.boats.team, j != i and scene.near[i, j] and not scene.inside_separation[i, j]
     return near and not scene.ours[j] and team[i] != team[j] and may_pursue(j, scene)
 
@@ -365,16 +365,18 @@ def falls_short_at_once(i: int, slot: int, level_m: float, least_m: float, scene
 
 @lean_kernel
 def worst_pursuer(i: int, slot: int, level_m: float, least_m: float, scene: Scene) -> None:
-    """Clearance from each pursuer, in ``scene.threats_m[slot]``; that in ``slot`` is lowered where it is worse.
+    """Find the margin from each pursuer (``scene.threats_m[slot]``); lower that in ``slot`` where it is worse.
 
-    What is known in full of a path is not asked again: it hangs on no teammate's manoeuvre, nor on the targets.
+    A path whose pursuers are fully known is not checked again: they depend on no teammate's manoeuvre, nor on the
+    targets.
 
     Where a path violates its required margin (``scene.violates_pursuers``) below the level, or below the least, the
-    search stops: no more need be known. The opponent that came there last is looked at first, so that most manoeuvres
+    search stops: no more need be known. The opponent that came there last is checked first, so that most manoeuvres
     that fail cost little.
 
-    ``scene.refused_by_table[slot]``: the margin is violated by what a table tells of the first place where the boat is
-    looked up, and by nothing worse. One step on (done = 1) that place is the same for all manoeuvres: none does better.
+    ``scene.refused_by_table[slot]``: the margin is violated by what a table reports of the first place where the boat
+    is looked up, and by nothing worse. One step ahead (done = 1) that place is the same for all manoeuvres: none does
+    better.
     """
     if not scene.pursuers_known[slot]:
         scene.pursuers_known[slot], scene.refused_by_table[slot], scene.threat_by[slot] = True, False, -1

@@ -1,11 +1,11 @@
-"""Margins against opponents from the value tables: the worst they can do is looked up instead of run through.
+"""Margins against opponents from the value tables: the worst they can do is looked up instead of rolled out.
 
 With V(x_i, x_j) the distance boat i can keep from opponent j for as long as the table looks ahead (`shield.tables`),
 
-    h_ij(x) = V(x_i, x_j) - R_ij - m,
+h_ij(x) = V(x_i, x_j) - R_ij - m,
 
-where m is the margin for the table's own error. The table says what the worst opponent does from some moment on, not
-what it does until then; so it is moved on in each of a few ways, and the least of the values counts.
+where m is the margin for the table's own error. The table covers the worst opponent from some moment on, not until
+then. So the opponent is moved on until then in each of a few ways, and the least value counts.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ MARGIN_THERE = PLACE_USABLE
 
 @lean_kernel
 def _note_place(row: Array, ready_thrust: float, place: Array) -> None:
-    """Write the place of a state row; of a boat not at full thrust the table tells nothing."""
+    """Write the place of a state row; a table reports nothing of a boat that is not at full thrust."""
     place[PLACE_X], place[PLACE_Y] = row[L.X], row[L.Y]
     place[PLACE_HEADING], place[PLACE_SPEED] = math.radians(row[L.HEADING]), row[L.SPEED]
     place[PLACE_USABLE] = 1.0 if row[L.THRUST] >= ready_thrust else 0.0
@@ -72,10 +72,10 @@ def run_opponents(steps: int, scene: Scene) -> None:
 
 @lean_kernel
 def find_outnumbered(scene: Scene) -> None:
-    """Mark the boats of ours of more than one opponent of which the tables tell something, at whatever thrust.
+    """Mark own boats near more than one opponent of which the tables report something, at whatever thrust.
 
-    Each table knows of one opponent only: two may each leave a way out, and not the same. Opponents of such a boat
-    are run through for some time as well, before they are looked up: then one manoeuvre has to do for all.
+    Each table knows one opponent only: two may each leave a way out, and not the same one. Opponents of such a boat
+    are also rolled out for some time before they are looked up; then one manoeuvre must clear all.
     """
     state, ours, boats = scene.state, scene.ours, scene.boats
     n = state.shape[0]
@@ -114,7 +114,7 @@ def set_place(i: int, slot: int, side: float, togo_deg: float, speed_mps: float,
 
 @lean_kernel
 def tabled(i: int, j: int, scene: Scene) -> bool:
-    """Whether a table is for boat i and opponent j, and tells enough of them."""
+    """Return whether a table is for boat i and opponent j and covers enough of them."""
     boats = scene.boats
     table = boats.table[i, j]
     if table < 0 or scene.inside_separation[i, j] or scene.known[j]:
@@ -124,13 +124,13 @@ def tabled(i: int, j: int, scene: Scene) -> bool:
 
 @lean_kernel
 def table_answers(i: int, j: int, slot: int, scene: Scene) -> bool:
-    """Whether the table answers for boat i at the place in ``slot`` and opponent j."""
+    """Return whether the table answers for boat i at the place in ``slot`` and opponent j."""
     return scene.look[slot, PLACE_USABLE] != 0.0 and tabled(i, j, scene)
 
 
 @lean_kernel
 def beyond_table(i: int, j: int, slot: int, scene: Scene) -> bool:
-    """Whether opponent j cannot be where its table tells anything by the time it is looked up, nor near before."""
+    """Return whether opponent j is too far for its table to report anything, and for coming near before."""
     boats, path, ready, course = scene.boats, scene.path[slot], scene.ready[slot], scene.course[j]
     own_mps = max(boats.fastest_mps[i], scene.state[i, L.SPEED])
     other_mps = max(boats.params[j, L.MAX_SPEED], scene.state[j, L.SPEED])
@@ -212,7 +212,7 @@ UNDER_WAY = 1.0 / 3.0
 
 @lean_kernel
 def adversarial_for(i: int, j: int, speed_mps: float, scene: Scene) -> float:
-    """Time, s, for which opponent j may do its worst against boat i at a speed; 0: it holds its course."""
+    """Return the time, s, for which opponent j may do its worst to boat i at a speed; 0: it holds its course."""
     boats = scene.boats
     horizon_s = scene.adversary_horizon_s[j]
     if horizon_s <= 0.0:

@@ -1,9 +1,10 @@
-"""The last line: beyond it, and before what nobody may touch, a boat is stopped, whatever else is in its way.
+"""The hard line: the shield stops a boat beyond it, and before obstacles that nobody may touch.
 
-Edges yield to boats, since who turns back into a pursuer is hit; so a boat may be chased far out. Where the settings
-say "stop" (`ShieldConfig.beyond_then`) a boat beyond the hard line is stopped there, and nothing it is told leads it
-onto an obstacle: behind every command lies its manoeuvre or a stop that stays clear of all of them, until it is at
-rest. Where a command has neither, the stop of now or the manoeuvre of the last decision still does, by the same rule.
+The operating area yields to boats, because a boat that turns back into a pursuer is hit; so a boat may be chased far
+out. Where the settings say "stop" (`ShieldConfig.beyond_then`), a boat beyond the hard line is stopped there, and no
+command leads it onto an obstacle. Behind every command lies a manoeuvre or a stop that stays clear of all obstacles
+until the boat is at rest. If a command has neither, the stop from now or the last manoeuvre still has one, by the same
+rule.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ LONGEST_STOP_S = 90.0
 
 @lean_kernel
 def _room(x: float, y: float, static: Static) -> float:
-    """Distance, m, from all that nobody may touch, less than 0 where it is touched."""
+    """Return the distance to everything that stops boats, m; negative where it is touched."""
     least = FAR
     for c in range(static.last_circles):
         least = min(least, to_circle(x, y, static.circles[c])[0])
@@ -45,7 +46,7 @@ def _room(x: float, y: float, static: Static) -> float:
 
 @lean_kernel
 def _through(x: float, y: float, row: Array, static: Static) -> bool:
-    """Whether the way from a place to that of a state goes through a wall."""
+    """Return whether the way from a position to that of a state crosses a wall."""
     through = False
     for w in range(static.last_segments):
         through = through or goes_through(x, y, row[L.X], row[L.Y], static.segments[w])
@@ -54,9 +55,9 @@ def _through(x: float, y: float, row: Array, static: Static) -> bool:
 
 @lean_kernel
 def _stays_clear(i: int, start: Array, side: float, togo_deg: float, speed_mps: float, scene: Scene) -> bool:
-    """Whether boat i stays clear from a state on: on a manoeuvre for the horizon, and then stopping.
+    """Return whether boat i stays clear from a state on: on a manoeuvre for the horizon, then stopping.
 
-    At no speed it is told to stop from the first step on. A boat that is too near already must come no nearer.
+    At speed 0 it stops from the first step on. A boat that is too near already must not come nearer.
     """
     boats, static, row, dt_s = scene.boats, scene.static, scene.row, scene.tuning.model_s
     params, x, y = boats.params[i], scene.state[i, L.X], scene.state[i, L.Y]
@@ -85,7 +86,7 @@ def _stays_clear(i: int, start: Array, side: float, togo_deg: float, speed_mps: 
 
 @lean_kernel
 def _stop(i: int, scene: Scene) -> None:
-    """Tell boat i to stop on its course, and rate that."""
+    """Command boat i to stop on its course, and score that."""
     scene.command[i, 0], scene.command[i, 1] = 0.0, 0.0
     predict(i, scene.command, scene)
     roll_out(i, i, 1.0, 0.0, 0.0, 1, scene)
@@ -95,7 +96,7 @@ def _stop(i: int, scene: Scene) -> None:
 
 @lean_kernel
 def _go_on_as_before(i: int, scene: Scene) -> bool:
-    """Make boat i's command that of the manoeuvre in memory, if it has one and it stays clear."""
+    """Command the remembered manoeuvre of boat i, if it has one that stays clear."""
     state = scene.state
     if not remembered(i, 0, state[i, L.HEADING], scene):
         return False
@@ -114,7 +115,7 @@ def _go_on_as_before(i: int, scene: Scene) -> bool:
 
 @lean_kernel
 def keep_last_line(scene: Scene) -> None:
-    """Stop the boats that are beyond the hard line, or that would else touch what nobody may."""
+    """Stop the boats that are beyond the hard line or would touch an obstacle that stops boats."""
     state, static = scene.state, scene.static
     for i in range(scene.ours.shape[0]):
         if not scene.ours[i]:

@@ -54,7 +54,7 @@ STILL, HOLDS = 1e-9, 1e-6
 
 @lean_kernel
 def _dot(a: Array, b: Array) -> float:
-    """Inner product; rows may be slices of a wider array, for which numpy's is slow."""
+    """Return the inner product; rows may be slices of a wider array, for which numpy's is slow."""
     total = 0.0
     for k in range(a.shape[0]):
         total += a[k] * b[k]
@@ -95,7 +95,7 @@ def project(C: Array, d: Array, z0: Array, z: Array, dual: Array) -> bool:
 
 @lean_kernel
 def _speed_effect(i: int, scene: Scene) -> float:
-    """Change of the next speed, m/s, per m/s of speed command, by a step of the model."""
+    """Return the change of the next speed, m/s, per m/s of speed command, by a step of the model."""
     params, command = scene.boats.params[i], scene.command[i]
     step = 0.1 * params[L.MAX_SPEED]
     if command[0] > 0.5 * params[L.MAX_SPEED]:
@@ -126,7 +126,7 @@ def _inputs_of(count: int, scene: Scene) -> None:
 
 @lean_kernel
 def _add_effect(r: int, i: int, m: int, sign: float, scene: Scene) -> None:
-    """Add to row r the share of boat i (mover m) in the clearance in ``scene.out``."""
+    """Add boat i's share (mover m) of the clearance in ``scene.out`` to row r."""
     path, at, nx, ny = scene.path[i], scene.out[SAMPLE], scene.out[NORMAL_X], scene.out[NORMAL_Y]
     k = min(int(at), path.shape[0] - 2)
     part = min(1.0, at - k)
@@ -243,14 +243,14 @@ def linearise(count: int, scene: Scene) -> int:
 
 @lean_kernel
 def solve(count: int, rows: int, scene: Scene) -> bool:
-    """Solve the program by projection; False when it has no solution."""
+    """Solve the QP by projection; return False when it has no solution."""
     n = 2 * count
     return project(scene.C[:rows, :n], scene.d[:rows], scene.z0[:n], scene.z[:n], scene.dual[:rows])
 
 
 @lean_kernel
 def among_mates(scene: Scene) -> bool:
-    """Whether teammates are in the way of any nominal command."""
+    """Return whether a nominal command fails because of teammates."""
     found = False
     for i in range(scene.ours.shape[0]):
         found = found or (scene.ours[i] and scene.violated[i] >= 0 and scene.ours[scene.violated[i]])
@@ -259,9 +259,9 @@ def among_mates(scene: Scene) -> bool:
 
 @lean_kernel
 def begin_program(scene: Scene) -> int:
-    """Make nominal commands the candidate of boats that teammates are in the way of, and of these; returns how many.
+    """Make nominal commands the candidate of boats that teammates block, and of these; return how many.
 
-    None that an opponent is in the way of, or whose backup is short of something: what these do is settled.
+    Boats whose nominal command an opponent blocks, and boats whose backup violates something, stay on their backups.
     """
     ours, moving = scene.ours, scene.moving
     moving[:] = False
@@ -300,7 +300,7 @@ def _take_answer(z: Array, count: int, scene: Scene) -> bool:
 
 @lean_kernel
 def accept(scene: Scene, z: Array, count: int) -> bool:
-    """Take an answer of the program; whether it costs no boat more than a little by the exact check."""
+    """Take an answer of the QP; return whether it costs no boat more than a little by the exact check."""
     if not _take_answer(z, count, scene):
         return False
     check(scene)
@@ -309,7 +309,7 @@ def accept(scene: Scene, z: Array, count: int) -> bool:
 
 @lean_kernel
 def end_program(scene: Scene, safe: bool, count: int) -> None:
-    """Name the reasons of an answer that was accepted, or take the backups back up."""
+    """Set the reasons of an accepted answer, or restore the backups."""
     for m in range(count):
         i = scene.movers[m]
         if safe:

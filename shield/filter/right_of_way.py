@@ -1,14 +1,14 @@
-"""Right of way: of two boats that keep each other from turning, one turns away and one stands on.
+"""Right of way: when two teammates keep each other from turning, one turns away and the other stands on.
 
-Two boats on all but the same course, each wanting to go where the other is, keep each other from turning for as long as
-both press: every decision is safe, and neither ever gets anywhere. Symmetry is broken as the rules of the road do, by
-what each can see of the other: who is behind, or has the other on its starboard side, gives way and turns away; the
-other stands on, holding its course. The shield checks these commands as any others.
+Two boats on nearly the same course may each want to go where the other is. Every decision is then safe, and neither
+boat ever arrives: a deadlock. The symmetry is broken as in the rules of the road, by what each boat sees of the other.
+The boat behind, or with the other on its starboard side, gives way and turns away; the other holds its course. The
+shield checks these commands like any others.
 
-An opponent knows nothing of this, and is answered by backups in full, which clear it.
+An opponent does not follow this rule; whole backups clear it.
 
-That robots behind barriers block each other, and that consistent sides resolve it: Wang, Ames, Egerstedt, "Safety
-barrier certificates for collisions-free multirobot systems", IEEE T-RO 33(3), 2017.
+Source on deadlocks between robots behind barriers, and on consistent sides: Wang, Ames, Egerstedt, "Safety barrier
+certificates for collisions-free multirobot systems", IEEE T-RO 33(3), 2017.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ PATIENCE = 3.0
 
 @lean_kernel
 def _alongside(i: int, turn_deg: float, speed_mps: float, scene: Scene) -> int:
-    """Nearest teammate alongside boat i on the side it wants to turn to; -1 for none."""
+    """Return the nearest teammate alongside boat i on the side it wants to turn to; -1 for none."""
     state, ours = scene.state, scene.ours
     found, least = -1, math.inf
     if speed_mps <= STILL_MPS or abs(turn_deg) <= PRESSING_DEG:
@@ -70,7 +70,7 @@ def _alongside(i: int, turn_deg: float, speed_mps: float, scene: Scene) -> int:
 
 @lean_kernel
 def _stands_on(i: int, j: int, state: Array) -> bool:
-    """Whether boat i is ahead of j, or abreast to starboard of it, by their mean course: j says the opposite."""
+    """Return whether boat i is ahead of j, or abreast to starboard of it, by mean course: j finds the opposite."""
     own, other = math.radians(state[i, L.HEADING]), math.radians(state[j, L.HEADING])
     east, north = math.sin(own) + math.sin(other), math.cos(own) + math.cos(other)
     length = math.sqrt(east * east + north * north)
@@ -85,7 +85,7 @@ def _stands_on(i: int, j: int, state: Array) -> bool:
 
 @lean_kernel
 def _who_blocks(i: int, turn_deg: float, speed_mps: float, scene: Scene) -> int:
-    """Boat that still keeps boat i from turning as it wants; -1 for none."""
+    """Return the boat that still keeps boat i from turning as it wants; -1 for none."""
     state, memory = scene.state, scene.memory
     if memory[i, W.HAS_BACKUP] == 0.0 or memory[i, W.DEADLOCK_S] <= 0.0 or memory[i, W.FREE_S] > FREED_S:
         return -1
@@ -97,7 +97,7 @@ def _who_blocks(i: int, turn_deg: float, speed_mps: float, scene: Scene) -> int:
 
 @lean_kernel
 def _goes_on(i: int, turn_deg: float, speed_mps: float, scene: Scene) -> bool:
-    """Whether boat i, which gives way, is not clear of the other yet: until it is, or wants to turn the way it does."""
+    """Return whether boat i must still give way: until it is clear, or wants to turn the way it gives way to."""
     state, ours, memory = scene.state, scene.ours, scene.memory
     j = int(memory[i, W.BLOCKED_BY])
     if j < 0 or not ours[j] or not scene.near[i, j] or memory[i, W.HAS_BACKUP] == 0.0:
@@ -110,7 +110,7 @@ def _goes_on(i: int, turn_deg: float, speed_mps: float, scene: Scene) -> bool:
 
 @lean_kernel
 def _press(i: int, turn_deg: float, speed_mps: float, scene: Scene) -> None:
-    """Go on counting how long boat i has been kept from turning, and decide whether it gives way."""
+    """Count on how long boat i has been kept from turning, and decide whether it gives way."""
     state, tuning, memory = scene.state, scene.tuning, scene.memory
     j = _who_blocks(i, turn_deg, speed_mps, scene)
     if j < 0:
@@ -130,7 +130,7 @@ def _press(i: int, turn_deg: float, speed_mps: float, scene: Scene) -> None:
 
 @lean_kernel
 def apply_right_of_way(i: int, scene: Scene) -> None:
-    """Replace the nominal command of boat i where it has been kept from turning for long enough."""
+    """Replace boat i's nominal command if it has been kept from turning for long enough."""
     tuning, memory = scene.tuning, scene.memory
     speed_mps, turn_deg = scene.command[i, 0], wrap_degrees(scene.command[i, 1])
     if memory[i, W.GIVES_WAY] != 0.0 and not _goes_on(i, turn_deg, speed_mps, scene):
@@ -147,14 +147,14 @@ def apply_right_of_way(i: int, scene: Scene) -> None:
 
 @lean_kernel
 def forget_deadlock(i: int, scene: Scene) -> None:
-    """Boat i is kept from turning by nobody, and gives way to nobody."""
+    """Note that nobody keeps boat i from turning, and that it gives way to nobody."""
     memory = scene.memory
     memory[i, W.GIVES_WAY], memory[i, W.DEADLOCK_S], memory[i, W.BLOCKED_BY] = 0.0, 0.0, -1
 
 
 @lean_kernel
 def note_deadlock(i: int, scene: Scene) -> None:
-    """Note since when, on what heading, boat i is kept from turning: its turn towards another was changed."""
+    """Note since when, and on what heading, boat i is kept from turning: its turn towards a teammate was changed."""
     state, tuning, memory = scene.state, scene.tuning, scene.memory
     if scene.reason[i] == W.RIGHT_OF_WAY:
         scene.bound[i], memory[i, W.FREE_S] = int(memory[i, W.BLOCKED_BY]), 0.0
