@@ -1,4 +1,4 @@
-"""The boat and its autopilot, written from their published equations, for the post-hoc analysis alone.
+"""Model of boat and autopilot, written from their published equations for the post-hoc analysis alone.
 
 ``p`` is a parameter row of `N_ROW` columns: kind (0 usv, 1 single, 2 double integrator, 3 rate), top speed, speed
 factor, max thrust, max rudder, turn loss, turn rate, max acc, max dec, rotation; speed kp, ki, kd, limit, gain; heading
@@ -31,24 +31,25 @@ N_STATE, N_ROW = 11, 38
 """Columns of a state row (x, y, heading, speed, thrust, rudder, speed error and integral, heading error and integral,
 turn rate), and of a parameter row."""
 MEMORY = (6, 8)
-"""Columns of a state that are NaN as long as the controller has not run."""
+"""Columns of a state that are NaN until the controllers first run."""
 KINDS = ("usv", "single_integrator", "double_integrator", "rate")
 MAP_SIZE, THRUSTS, SPEEDS = 21, 22, 30
-"""Where the thrust map stands in a parameter row."""
+"""Columns of the thrust map in a parameter row."""
 LARGEST_ERROR_DEG = 179.9
-"""Largest relative heading commanded: at 180 an absolute heading no longer tells to which side."""
+"""Largest relative heading commanded, deg: at 180 an absolute heading leaves the side of the turn open."""
 DOWN, HOLD, UP = 0, 1, 2
-"""Speed choices of a search: slow down, leave the thrust as it is, speed up."""
+"""Speed choices of a search: slow down, hold the thrust, speed up."""
 
 
 @dataclass(frozen=True)
 class Boat:
     """A boat and its autopilot. Speeds m/s, accelerations m/s2, angles deg, thrust and rudder percent.
 
-    Kind "usv" steers by thrust and rudder, "rate" by a rate loop: max rudder is its turn rate at rest, deg/s, turn rate
-    what it gains with speed, deg/s per m/s, the heading controller's kp what is asked for per deg of error, 1/s; kd of
-    both controllers are lags, s. A speed factor of 0: a speed controller changes the thrust; a max acc or dec of 0: no
-    limit. Controllers are kp, ki, kd, integral limit; ``turn_rate`` of a usv is at full rudder and thrust 50.
+    Controllers are kp, ki, kd, integral limit. Kind "usv" steers by thrust and rudder; its ``turn_rate`` is at full
+    rudder and thrust 50. Kind "rate" steers by a rate loop: ``max_rudder`` is its turn rate at rest, deg/s;
+    ``turn_rate`` the gain with speed, deg/s per m/s; the heading kp the rate commanded per deg of error, 1/s; kd of
+    both controllers are lags, s. With a speed factor of 0, a speed controller changes the thrust. A max acc or dec of 0
+    means no limit.
 
     Raises:
         OracleError: values no boat can have.
@@ -77,7 +78,7 @@ class Boat:
         rows_of([self])
 
     def row(self) -> Array:
-        """The parameter row."""
+        """Return the parameter row."""
         plain = [value for entry in astuple(self)[1:-1] for value in np.atleast_1d(entry)]
         points = np.zeros((SPEEDS - THRUSTS, 2))
         points[: len(self.thrust_map)] = self.thrust_map
@@ -85,10 +86,10 @@ class Boat:
 
 
 def rows_of(boats: Iterable[Any]) -> Array:
-    """Parameter rows (n, N_ROW) of boats, or of the simulator's rows themselves.
+    """Return parameter rows (n, N_ROW) of boats given as `Boat`s or as the simulator's rows.
 
     Raises:
-        OracleError: another shape, or values no boat can have.
+        OracleError: wrong shape, or values no boat can have.
     """
     given = [boat.row() if isinstance(boat, Boat) else np.asarray(boat, dtype=np.float64) for boat in boats]
     for row in given:
@@ -103,41 +104,41 @@ def rows_of(boats: Iterable[Any]) -> Array:
 
 
 def top_mps(p: Array) -> float:
-    """A speed over ground the boat never exceeds, m/s, for a start within its top speed."""
+    """Return a speed over ground the boat never exceeds, m/s, if it starts within its top speed."""
     return float(max(p[1], p[SPEEDS:][: int(p[MAP_SIZE])].max()))
 
 
 @cache
 def _stamp() -> tuple[str, int]:
-    """Of the whole folder: functions are compiled into one another across files, numba asks only for their own."""
+    """Return a fingerprint of the whole folder: numba tracks one file, but functions are inlined across files."""
     files = sorted(Path(__file__).parent.glob("*.py"))
     return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest(), len(files)
 
 
 class _Kept(FunctionCache):
-    """numba's cache on disk: files that cannot be read are written anew; a disk that is full keeps nothing."""
+    """numba's disk cache that rewrites unreadable files and caches nothing on a full disk."""
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The code of a signature, None when it must be compiled."""
+        """Return the compiled code of a signature, or None if it must be compiled."""
         try:
             return super().load_overload(sig, target_context)
-        except Exception:  # what damage leads to is anything
+        except Exception:  # a damaged file can raise anything
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep the code of a signature."""
+        """Save the compiled code of a signature."""
         try:
             super().save_overload(sig, data)
-        except Exception:  # the index is one of the files that cannot be read, or nothing can be written
+        except Exception:  # unreadable index, or nothing can be written
             with contextlib.suppress(OSError):
                 self.flush()
                 super().save_overload(sig, data)
 
 
 def compiled(function: F) -> F:
-    """Compile with numba; IEEE division, no fast-math."""
+    """Compile with numba, with IEEE division and no fast-math."""
     dispatcher: Any = njit(nogil=True, error_model="numpy")(function)
-    with contextlib.suppress(RuntimeError, OSError):  # no folder can be written to: compiled at every start
+    with contextlib.suppress(RuntimeError, OSError):  # no writable folder: compile at every start
         kept = _Kept(function)
         kept._cache_file._source_stamp = _stamp()
         dispatcher._cache = kept
@@ -146,13 +147,13 @@ def compiled(function: F) -> F:
 
 @compiled
 def within(value: float, limit: float) -> float:
-    """Cut to [-limit, limit]."""
+    """Clip to [-limit, limit]."""
     return max(-limit, min(limit, value))
 
 
 @compiled
 def speed_at(p: Array, thrust: float) -> float:
-    """Straight-line speed of a thrust, m/s, between the points of the map; flat beyond its ends."""
+    """Return the straight-line speed of a thrust, m/s: linear between points of the map, constant beyond its ends."""
     if thrust <= p[THRUSTS]:
         return p[SPEEDS]
     last = int(p[MAP_SIZE]) - 1
@@ -165,7 +166,7 @@ def speed_at(p: Array, thrust: float) -> float:
 
 @compiled
 def _controller(p: Array, s: Array, at: int, memory: int, error: float, dt_s: float, most: float) -> float:
-    """Output of the controller whose gains begin at ``at`` of p and whose memory begins at ``memory`` of s."""
+    """Return the output of the controller with gains from ``p[at]`` on and memory from ``s[memory]`` on."""
     slope = 0.0 if math.isnan(s[memory]) else (error - s[memory]) / dt_s
     s[memory] = error
     s[memory + 1] = within(s[memory + 1] + p[at + 1] * error * dt_s, p[at + 3])
@@ -174,7 +175,7 @@ def _controller(p: Array, s: Array, at: int, memory: int, error: float, dt_s: fl
 
 @compiled
 def _usv(p: Array, s: Array, speed_mps: float, error_deg: float, dt_s: float) -> None:
-    """Thrust, rudder, then the hull."""
+    """Advance thrust, rudder, then the hull."""
     thrust = p[2] * speed_mps
     if p[2] == 0.0:
         thrust = s[4] + p[14] * _controller(p, s, 10, 6, speed_mps - s[3], dt_s, p[3])
@@ -196,7 +197,7 @@ def _usv(p: Array, s: Array, speed_mps: float, error_deg: float, dt_s: float) ->
 
 @compiled
 def _turns(p: Array, speed_mps: float) -> float:
-    """Highest turn rate at a speed, deg/s."""
+    """Return the highest turn rate at a speed, deg/s."""
     return max(0.0, min(p[19], p[4] + p[6] * speed_mps))
 
 
@@ -207,7 +208,7 @@ def _lag(lag_s: float, dt_s: float) -> float:
 
 @compiled
 def _integrate(p: Array, s: Array, speed_mps: float, error_deg: float, dt_s: float) -> None:
-    """The integrators, and boats with a rate loop: kp e turns, beyond a corner its square root (ArduPilot)."""
+    """Advance integrators and rate-loop boats; the loop's rate is kp e, a square root beyond a corner (ArduPilot)."""
     if p[0] == 1.0:
         speed, rate = within(speed_mps, p[1]), within(error_deg / dt_s, p[19])
     elif p[0] == 3.0:
@@ -238,7 +239,7 @@ def _go(s: Array, speed_mps: float, turn_deg: float, dt_s: float) -> None:
 
 @compiled
 def turned(heading_deg: float, turn_deg: float) -> float:
-    """Heading after a turn, within [-180, 180]."""
+    """Return the heading after a turn, within [-180, 180]."""
     heading = heading_deg + turn_deg
     if heading > 180.0:
         return heading - 360.0
@@ -247,7 +248,7 @@ def turned(heading_deg: float, turn_deg: float) -> float:
 
 @compiled
 def step(p: Array, s: Array, speed_mps: float, error_deg: float, dt_s: float) -> None:
-    """Advance the whole boat by one step of ``dt_s``, in place, commanded a speed and a relative heading."""
+    """Advance boat and autopilot by ``dt_s``, in place, under a commanded speed and relative heading."""
     if p[0] != 0.0:
         _integrate(p, s, speed_mps, error_deg, dt_s)
     else:
@@ -256,11 +257,11 @@ def step(p: Array, s: Array, speed_mps: float, error_deg: float, dt_s: float) ->
 
 @compiled
 def command_of(p: Array, s: Array, choice: int, rudder: float, dt_s: float) -> tuple[float, float]:
-    """Command (speed m/s, relative heading deg) by which the autopilot now does what a search chose.
+    """Return the command (speed m/s, relative heading deg) that makes the autopilot apply a choice of the search.
 
-    The heading controller answers a command at once through its derivative, so nearly any rudder (share of full, or of
-    the turn rate, positive to the right) can be had in any step; what cannot (a relative heading beyond 179.9 deg) is
-    cut, and the boat then does what the command gives.
+    The derivative of the heading controller responds at once, so nearly any rudder (share of full, or of the turn rate,
+    positive to the right) is available in any step. Beyond a relative heading of 179.9 deg the command is clipped, and
+    the boat does what the clipped command yields.
     """
     if choice == HOLD:
         speed = s[4] / p[2] if p[0] == 0.0 and p[2] != 0.0 else s[3]
@@ -279,7 +280,7 @@ def command_of(p: Array, s: Array, choice: int, rudder: float, dt_s: float) -> t
 
 @compiled
 def _error_for(p: Array, s: Array, rudder: float, dt_s: float) -> float:
-    """Heading error for a rudder: kp e + I + ki e dt + kd (e - last)/dt = rudder, I cut at its limit."""
+    """Solve kp e + I + ki e dt + kd (e - last)/dt = rudder for the heading error e, with I clipped at its limit."""
     slope, known = p[15], rudder
     if not math.isnan(s[8]):
         slope += p[17] / dt_s
@@ -295,9 +296,9 @@ def _error_for(p: Array, s: Array, rudder: float, dt_s: float) -> float:
 
 @compiled
 def replay(p: Array, start: Array, commands: Array, others: Array, dt_s: float, path: Array, headings: Array) -> float:
-    """Drive a boat by commands (S, 2); the smallest distance to the others (S+1, m, 2) after any step, m.
+    """Simulate a boat under commands (S, 2); return its smallest distance to the others (S+1, m, 2) after any step, m.
 
-    Writes the positions into ``path`` (S+1, 2), and the heading before each step, deg, into ``headings`` (S,).
+    Writes positions into ``path`` (S+1, 2) and the heading before each step, deg, into ``headings`` (S,).
     """
     s, closest = start.copy(), np.inf
     path[0, 0], path[0, 1] = s[0], s[1]

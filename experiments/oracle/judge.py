@@ -1,16 +1,15 @@
 """Judging a separation violation: could own commands have kept the radius, until when, and who let that pass?
 
-Looking back from it, own commands may begin to differ at any step of the last T seconds at which the pair is
-apart. The tracks of all others stay as they were. It is avoidable when, from one of those steps on, some
-sequence of commands keeps the radius from every boat until the pair was apart again, and a settle time longer. A third
-boat that is inside the radius when the commands begin is another violation, already under way: it is left out until it
-was apart in the record, and kept clear of from then on.
+Own commands may begin to differ at any step of the last T seconds before the violation at which the pair is apart. All
+other tracks stay fixed. The violation is avoidable if, from one of those steps on, some sequence of commands keeps the
+radius from every boat until the pair was apart again, plus a settle time. A third boat already inside the radius when
+the commands begin is a separate violation: it is ignored until it was apart in the record, and avoided from then on.
 
-Between two steps with no entry in between, whoever can still avoid from the later one can also avoid from the earlier
-one, by following the recorded track. So the latest such step is found by growing leads and bisection.
+Between two steps without an entry in between, a boat that can avoid from the later step can also avoid from the
+earlier one, by following the recorded track. Growing leads and bisection therefore find the latest such step.
 
-A current carries all boats: in the frame of the water boats move by their own equations and distances are the same, so
-that is where plans are searched. A late command changes nothing but the first state that it can change.
+A current carries all boats alike. In the frame of the water boats obey their own equations and distances are the same,
+so plans are searched there. With a command delay, a search starts from the first state that the command can change.
 """
 
 from __future__ import annotations
@@ -28,9 +27,9 @@ from .search import Task, commands_of, search
 from .verdict import AT_ONCE, BreachVerdict, Level, Motion, OracleError, Outcome, Plan, Responsible, Settings, Verdict
 
 ROUNDING_M = 1e-9
-"""Kept above the radius, so that a plan replayed with other rounding is still clear."""
+"""Added to the radius, so that a plan replayed with other rounding is still clear, m."""
 FAR_M = 1e9
-"""Where boats are that need not be kept clear of, m."""
+"""Position given to boats that need not be avoided, m."""
 DEFAULT = Settings()
 
 
@@ -50,13 +49,13 @@ def judge(
     Args:
         states: (T+1, n, 11) state rows of all boats; index k after k steps.
         boats: parameters of the n boats: `Boat`s or the simulator's rows (n, 38).
-        own: index of the boat that is judged.
+        own: index of the judged boat.
         step: index of the first state inside the radius.
-        radius_m: separation radius, m; at exactly the radius is inside.
-        dt_s: length of a step.
-        other: the boat it came too close to; the nearest at ``step`` when left out.
-        settings: how far to look and how finely to search.
-        motion: current and delay of the record.
+        radius_m: separation radius, m; exactly the radius counts as inside.
+        dt_s: length of a step, s.
+        other: the boat it came too close to; default: the nearest at ``step``.
+        settings: look-back times and search resolution.
+        motion: current and delays of the record.
 
     Raises:
         OracleError: the record, boats or numbers cannot be judged, or there is no violation at ``step``.
@@ -67,7 +66,7 @@ def judge(
 def judge_breach(
     states: Any, boats: Any, pair: tuple[int, int], step: int, radius_m: float, dt_s: float = 0.1, **rest: Any
 ) -> BreachVerdict:
-    """Judge a violation from both sides; the rest is as for `judge_breaches`."""
+    """Judge a violation from both sides; further arguments as for `judge_breaches`."""
     return judge_breaches(states, boats, [(step, *pair)], radius_m, dt_s, **rest)[0]
 
 
@@ -81,13 +80,13 @@ def judge_breaches(
     settings: Settings = DEFAULT,
     motion: Motion = AT_ONCE,
 ) -> list[BreachVerdict]:
-    """Judge many separation violations of one record, each from both sides; what is not said here is as in `judge`.
+    """Judge separation violations of one record, each from both sides; other arguments as for `judge`.
 
-    ``breaches``: rows (step, boat a, boat b, ...), further columns being ignored; ``driven``: (T, n) bool, whether the
-    game drove the boat in step k -> k+1, None when it never did.
+    ``breaches``: rows (step, boat a, boat b, ...); further columns are ignored. ``driven``: (T, n) bool, whether the
+    game controlled the boat in step k -> k+1; None: never.
 
     Raises:
-        OracleError: see `judge`, or ``driven`` has another shape.
+        OracleError: see `judge`, or ``driven`` has another shape or type.
     """
     rows = [tuple(int(value) for value in row[:3]) for row in breaches]
     if not rows:
@@ -107,7 +106,7 @@ def judge_breaches(
 
 @dataclass(frozen=True)
 class _Record:
-    """A run whose violations are judged, checked; ``way_m`` (T+1, 2): how far the water has gone."""
+    """A checked record; ``way_m`` (T+1, 2) is the displacement of the water."""
 
     states: Array
     boats: Array
@@ -122,7 +121,7 @@ def _record_of(states: Any, boats: Any, radius_m: float, dt_s: float, settings: 
     """Check a record.
 
     Raises:
-        OracleError: another shape, a single boat or step, or numbers that are not finite.
+        OracleError: wrong shape, fewer than two boats or one step, or non-finite numbers.
     """
     try:
         table = np.ascontiguousarray(states, dtype=np.float64)
@@ -150,7 +149,7 @@ def _record_of(states: Any, boats: Any, radius_m: float, dt_s: float, settings: 
 
 
 def _partner(record: _Record, own: int, step: int, other: int | None) -> int:
-    """The boat that the own one came too close to in that step.
+    """Return the boat that the own boat came too close to in that step.
 
     Raises:
         OracleError: there is no such boat, or no violation at that step.
@@ -173,7 +172,7 @@ def _partner(record: _Record, own: int, step: int, other: int | None) -> int:
 
 
 def _judge(record: _Record, own: int, step: int, other: int | None) -> Verdict:
-    """One boat's side of a violation."""
+    """Judge one boat's side of a violation."""
     partner, settings = _partner(record, own, step, other), record.settings
     tracks = np.ascontiguousarray(np.delete(record.states[:, :, :2], own, axis=1))
     column = partner - (partner > own)
@@ -184,7 +183,7 @@ def _judge(record: _Record, own: int, step: int, other: int | None) -> Verdict:
     apart = np.flatnonzero(gaps[step : step + longest + 1, column] > record.radius_m)
     end = min(len(gaps) - 1, step + (int(apart[0]) if apart.size else longest) + settle)
     first, delay = max(0, step - look), record.delay_steps[own]
-    changed = min(step, first + delay)  # the first state that the first command looked at changes
+    changed = min(step, first + delay)  # the first state that the earliest command can change
     inside = gaps <= record.radius_m + ROUNDING_M
     asked = Question(record, own, tracks, inside, end)
     outcome, plan, exhausted, last = Outcome.UNAVOIDABLE, None, None, None
@@ -214,9 +213,10 @@ def _judge(record: _Record, own: int, step: int, other: int | None) -> Verdict:
 
 
 def runs(inside: NDArray[np.bool_], partner: int, first: int) -> list[tuple[int, int]]:
-    """Stretches of steps with the pair apart and no other boat entering, as (first, last) indices of the record.
+    """Return stretches of steps with the pair apart and no other boat entering, as (first, last) indices of the record.
 
-    ``inside`` (steps, m): whether each boat, ``partner`` being the pair's, is within the radius from step ``first`` on.
+    ``inside`` (steps, m): whether each boat is within the radius, from step ``first`` on; ``partner``: the pair's
+    column.
     """
     entered = np.zeros(len(inside), dtype=np.bool_)
     entered[1:] = (inside[1:] & ~inside[:-1]).any(axis=1)
@@ -230,10 +230,10 @@ def runs(inside: NDArray[np.bool_], partner: int, first: int) -> list[tuple[int,
 
 
 class Question:
-    """Can a boat keep clear from a step on, in the frame of the water? What is found is proved by replay, and kept.
+    """Search for plans that keep a boat clear from a step on, in the frame of the water; replay proves each plan.
 
-    ``tracks`` (T+1, m, 2) are the others', ``inside`` (T+1, m) whether they are within the radius, which must be kept
-    up to state ``end``.
+    ``tracks`` (T+1, m, 2) are the others' positions; ``inside`` (T+1, m) whether they are within the radius. The radius
+    must be kept up to state ``end``.
     """
 
     def __init__(self, record: _Record, own: int, tracks: Array, inside: NDArray[np.bool_], end: int) -> None:
@@ -243,18 +243,18 @@ class Question:
         self.searches = 0
         self.plans: dict[int, Plan] = {}
         self.failures: dict[tuple[int, Level], bool] = {}
-        """Searches that found nothing, by step and level: whether they dropped no state for lack of width."""
+        """Failed searches, by step and level: whether they dropped no state for lack of width."""
 
     @property
     def exhausted(self) -> bool:
-        """Whether the full searches that failed dropped no state."""
+        """Whether the failed full searches dropped no state."""
         return all(whole for (_, level), whole in self.failures.items() if level == self.record.settings.full)
 
     def latest(self, low: int, high: int) -> tuple[int | None, bool]:
         """Find the latest step of [low, high] from which the violation can be avoided.
 
         Returns:
-            The step, None when there is none; whether the search that failed after it was exhausted.
+            The step, or None; whether the search that failed after it was exhausted.
         """
         quick, full = self.record.settings.quick, self.record.settings.full
         best, failed = self._bracket(low, high, quick, growth=2)
@@ -265,7 +265,7 @@ class Question:
         else:
             best, failed = self._bisect(best, failed, quick)
             failed, stride = high + 1, 1
-            while best < high:  # later, in growing strides, until the full search fails as well
+            while best < high:  # try later steps in growing strides until the full search fails
                 begin = min(high, best + stride)
                 if not self.answer(begin, full):
                     failed = begin
@@ -275,7 +275,7 @@ class Question:
         return best, failed > high or self.failures[failed, full]
 
     def _bracket(self, low: int, high: int, level: Level, growth: int) -> tuple[int | None, int]:
-        """Multiply the lead until a search succeeds: the step it began at, and the latest one tried before."""
+        """Multiply the lead until a search succeeds; return its step (or None) and the latest failed step."""
         failed, lead = high + 1, 0
         while True:
             begin = max(low, high - lead)
@@ -292,18 +292,18 @@ class Question:
         return best, failed
 
     def answer(self, begin: int, level: Level) -> bool:
-        """Search from state ``begin``; a plan found is kept."""
+        """Return whether a search from state ``begin`` finds a plan; cache the result."""
         if begin in self.plans:
             return True
         if (begin, level) in self.failures:
             return False
         record, start, length = self.record, self.rows[begin].copy(), self.end - begin
         tracks, whole = self.tracks[begin : self.end + 1].copy(), True
-        # a boat that is inside at that step is far away until it was apart
+        # ignore a boat that is inside at ``begin`` until it was apart
         tracks[np.logical_and.accumulate(self.inside[begin : self.end + 1], axis=0)] = FAR_M
         reach = record.radius_m + 1.0 + record.dt_s * max(top_mps(self.p), start[3]) * np.arange(len(tracks))
         near = (np.hypot(*np.moveaxis(tracks - start[:2], -1, 0)) <= reach[:, None]).any(axis=0)
-        others = np.ascontiguousarray(tracks[:, near])  # those that the own boat could come near at all
+        others = np.ascontiguousarray(tracks[:, near])  # only boats that the own boat can come near
         rudders, limit_m = np.array(sorted(level.rudders)), record.radius_m + ROUNDING_M
         task = Task(self.p, others, limit_m, record.dt_s, rudders, np.array(level.cells))
         for first_s in level.schedules:
@@ -320,7 +320,7 @@ class Question:
         return False
 
     def _proved(self, begin: int, commands: Array, others: Array) -> Plan:
-        """Replay the commands against all boats; a plan counts only when that, too, stays clear."""
+        """Replay the commands against all boats; raise `OracleError` if the replay does not stay clear."""
         path, headings = np.empty((len(commands) + 1, 2)), np.empty(len(commands))
         closest_m = replay(self.p, self.rows[begin], commands, others, self.record.dt_s, path, headings)
         if not closest_m > self.record.radius_m:
@@ -330,7 +330,7 @@ class Question:
 
 
 def _lengths(first_s: tuple[float, ...], steps: int, dt_s: float) -> IntArray:
-    """Split a number of steps into choices: the first lengths as given, then the last one over and over."""
+    """Split a number of steps into choices: the given lengths first, then the last one repeatedly."""
     lengths: list[int] = []
     while (left := steps - sum(lengths)) > 0:
         wanted_s = first_s[min(len(lengths), len(first_s) - 1)]

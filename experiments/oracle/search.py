@@ -1,10 +1,10 @@
-"""Searching own commands that keep clear of given tracks: layer by layer, equal states merged, the best kept.
+"""Search of own commands that keep clear of given tracks: layer by layer, with equal states merged and the best kept.
 
-A layer holds the states reachable at one time. From each, every choice of speed and rudder is held for a few steps of
-the full model, controllers included, and dropped as soon as a boat comes within the radius. States in the same cell
-(position, heading, speed, thrust) are one. When more are left than the width, most places go to those whose straight
-course stays clear longest, the rest are spread over all others. From the best of each layer simple courses are run to
-the end: the first that stays clear ends the search.
+A layer holds states reachable at one time. From each state, every choice of speed and rudder is held for a few steps of
+the full model, controllers included. A choice is dropped as soon as a boat comes within the radius. States in the same
+cell (position, heading, speed, thrust) are merged. If more states remain than the width, most places go to those
+whose straight course stays clear longest; the rest are spread over all others. From the best states of each layer,
+simple courses are simulated to the end: the first that stays clear ends the search.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 from .boat_model import DOWN, HOLD, UP, Array, IntArray, command_of, compiled, step
 
 N_SPEEDS = 3
-_TRIED = 3  # states of a layer from which simple courses are run to the end
-_LOOK = 5  # steps between looks along a straight course
+_TRIED = 3  # states of a layer from which simple courses are simulated to the end
+_LOOK = 5  # steps between checks along a straight course
 
 
 class Task(NamedTuple):
-    """What commands are searched for: of a boat ``p``, to keep ``limit_m`` from ``others`` (K+1, m, 2).
+    """A search task: boat ``p`` must stay farther than ``limit_m`` from ``others`` (K+1, m, 2).
 
-    ``rudders``: choices, shares of full, rising, symmetric; ``sizes`` (5,): cells of x, y, heading, speed, thrust.
+    ``rudders``: choices as shares of full, ascending, symmetric; ``sizes`` (5,): cells of x, y, heading, speed, thrust.
     """
 
     p: Array
@@ -37,7 +37,7 @@ class Task(NamedTuple):
 
 
 class Layer(NamedTuple):
-    """Room for the states of a layer: rows, cells, rates, where each is from, and a hash table of the cells."""
+    """Buffers for the states of a layer: rows, cell keys, rates, origins, and a hash table of the cells."""
 
     made: Array
     keys: IntArray
@@ -48,7 +48,7 @@ class Layer(NamedTuple):
 
 @compiled
 def clear_after(task: Task, s: Array, choice: int, rudder: float, steps: int, k: int) -> bool:
-    """Hold a choice for some steps from time index ``k``, in place; False as soon as a boat is within ``limit_m``."""
+    """Hold a choice for ``steps`` from time index ``k``, in place; return False once a boat is within ``limit_m``."""
     others, limit = task.others, task.limit_m * task.limit_m
     for i in range(k + 1, k + steps + 1):
         speed, error = command_of(task.p, s, choice, rudder, task.dt_s)
@@ -62,7 +62,7 @@ def clear_after(task: Task, s: Array, choice: int, rudder: float, steps: int, k:
 
 @compiled
 def promise(s: Array, others: Array, k: int, limit_m: float, dt_s: float) -> float:
-    """Rate a state at time index ``k``: steps until a straight course meets a boat, plus a little for clearance."""
+    """Rate a state at time index ``k``: steps until a straight course meets a boat, plus up to 1 for clearance."""
     east, north = s[3] * math.sin(math.radians(s[2])) * dt_s, s[3] * math.cos(math.radians(s[2])) * dt_s
     limit, nearest = limit_m * limit_m, np.inf
     last = others.shape[0] - 1
@@ -89,7 +89,7 @@ def _cell(s: Array, sizes: Array) -> int:
 
 @compiled
 def _slot(table: IntArray, keys: IntArray, key: int) -> int:
-    """Place of a key in the hash table, or of the empty place where it belongs."""
+    """Return the place of a key in the hash table, or the empty place where it belongs."""
     place = (key ^ (key >> 17)) & (table.size - 1)
     while table[place] >= 0 and keys[table[place]] != key:
         place = (place + 1) & (table.size - 1)
@@ -98,7 +98,7 @@ def _slot(table: IntArray, keys: IntArray, key: int) -> int:
 
 @compiled
 def _expand(task: Task, layer: Array, k: int, steps: int, room: Layer) -> int:
-    """Make the next layer from ``layer``; returns how many states it has."""
+    """Write the next layer into ``room``; return its number of states."""
     made, keys, rates, origin, table = room
     rudders = task.rudders
     count = 0
@@ -127,7 +127,7 @@ def _expand(task: Task, layer: Array, k: int, steps: int, room: Layer) -> int:
 
 @compiled
 def _choose(rates: Array, width: int) -> NDArray[np.signedinteger[Any]]:
-    """Indices of the states to keep: three quarters by promise, the rest evenly from what remains."""
+    """Return indices of the states to keep: three quarters by rate, the rest evenly from what remains."""
     if rates.size <= width:
         return np.arange(rates.size)
     best = max(1, width - width // 4)
@@ -143,7 +143,7 @@ def _choose(rates: Array, width: int) -> NDArray[np.signedinteger[Any]]:
 
 @compiled
 def _finish(task: Task, layer: Array, rates: Array, k: int) -> tuple[int, int]:
-    """Run simple courses from the most promising states; (state, action) of one that stays clear, or (-1, -1)."""
+    """Simulate simple courses from the best states; return (state, action) of one that stays clear, or (-1, -1)."""
     left, rudders, steps = rates.copy(), task.rudders, task.others.shape[0] - 1 - k
     for _ in range(min(_TRIED, left.size)):
         node = int(np.argmax(left))
@@ -157,13 +157,13 @@ def _finish(task: Task, layer: Array, rates: Array, k: int) -> tuple[int, int]:
 
 @compiled
 def search(task: Task, start: Array, lengths: IntArray, width: int, actions: IntArray) -> tuple[bool, bool]:
-    """Look for actions that keep farther than the limit from the others until their tracks end.
+    """Search actions that stay farther than the limit from the others until their tracks end.
 
-    ``lengths`` (N,) are the steps per choice, summing to K; ``width``: most states per layer; ``actions`` (N,) are
-    filled when found, each speed choice * rudders + rudder.
+    ``lengths`` (N,) are steps per choice and sum to K. ``width``: most states per layer. ``actions`` (N,) are written
+    if found, each speed choice * rudders + rudder.
 
     Returns:
-        Whether a sequence was found, and whether no state was ever dropped for lack of width.
+        Whether a sequence was found; whether no state was dropped for lack of width.
     """
     most = width * N_SPEEDS * task.rudders.size
     made, keys = np.empty((most, start.size)), np.empty(most, dtype=np.int64)
@@ -201,7 +201,7 @@ def _trace(history: IntArray, layers: int, node: int, actions: IntArray) -> None
 
 @compiled
 def commands_of(task: Task, start: Array, actions: IntArray, lengths: IntArray, commands: Array) -> None:
-    """Turn actions into the commands (K, 2) that make the autopilot do them."""
+    """Convert actions into the commands (K, 2) that make the autopilot apply them."""
     s, k, rudders = start.copy(), 0, task.rudders
     for n in range(lengths.size):
         for _ in range(lengths[n]):

@@ -1,11 +1,10 @@
-"""What the post-hoc analysis is asked with, what it says about a separation violation, and who is responsible.
+"""Settings and verdicts of the post-hoc analysis, and the rule for responsibility.
 
-Responsible is who had the last clear chance: each boat is judged with the other's actual track held fixed, and the boat
-whose last preventable step is the later one let the last chance pass, by the command of that step. When both had their
-last chance within one step of each other, both are responsible. Where commands take effect late, it is the moments at
-which they had to be given that are compared. When the game itself drove that boat in that step (a tagged boat on its
-way home), the game is. When neither could have avoided it, neither is; a pair that was inside when the record began is
-a matter of the start.
+The boat with the last clear chance is responsible. Each boat is judged with the other's actual track held fixed; the
+boat with the later last preventable step let the last chance pass. If both last chances are within one step of each
+other, both are responsible. With command delays, the analysis compares the moments at which commands had to be given.
+If the game controlled that boat in that step (a tagged boat on its way home), the game is responsible. If neither
+could have avoided the violation, neither is. If the pair was inside when the record began, the start is.
 """
 
 from __future__ import annotations
@@ -26,11 +25,11 @@ class OracleError(ValueError):
 
 
 class Level(NamedTuple):
-    """Fineness of a search.
+    """Resolution of a search.
 
-    ``width``: most states kept per layer; ``cells``: sizes of x and y, m, heading, deg, speed, m/s, thrust, percent,
-    states of one layer in the same cell counting as the same; ``rudders``: choices, shares of full rudder, rising;
-    ``schedules``: each a search of its own: lengths of the first choices, s, later ones being as the last.
+    ``width``: most states kept per layer. ``cells``: sizes of x and y, m, heading, deg, speed, m/s, and thrust,
+    percent; states of one layer in the same cell are merged. ``rudders``: choices as shares of full rudder, ascending.
+    ``schedules``: each is a separate search and lists the lengths of the first choices, s; the last length repeats.
     """
 
     width: int
@@ -41,7 +40,7 @@ class Level(NamedTuple):
 
 QUICK = Level(150, (0.5, 0.5, 10.0, 0.25, 15.0), (-1.0, 0.0, 1.0), ((0.5, 0.5, 0.5, 1.0),))
 SCHEDULES = ((0.5,), (0.1, 0.1, 0.1, 0.2, 0.2, 0.3), (*(0.1,) * 15, *(0.2,) * 5, 0.3))
-"""Short choices catch the last moment, but differ by less than a cell on a slow boat; longer ones do not."""
+"""Short choices find the last moment, but on a slow boat they differ by less than a cell; longer choices do not."""
 FULL = Level(2000, (0.05, 0.05, 2.0, 0.03, 3.0), (-1.0, -0.5, 0.0, 0.5, 1.0), SCHEDULES)
 
 
@@ -51,11 +50,11 @@ class Settings:
 
     Attributes:
         look_back_s: T, how long before the violation own commands may begin to differ, s.
-        settle_s: how long after it the radius must still be kept, s. A plan that is clear when the real pair came
-            apart, but heads into the next contact, has avoided nothing; beyond a few seconds, however, the others'
-            recorded tracks answer a boat that is no longer there. 5 s lets a heron turn through 180 deg.
-        longest_s: a violation counts as over after this time, s: boats may be parked side by side for minutes.
-        quick: level tried first; what it finds is proof.
+        settle_s: how long after the violation the radius must still be kept, s. A plan that is clear when the real pair
+            came apart, but heads into the next contact, has avoided nothing. Beyond a few seconds, the others' recorded
+            tracks respond to a boat that is no longer there. 5 s lets a heron turn through 180 deg.
+        longest_s: a violation counts as over after this time, s, because boats may be parked side by side for minutes.
+        quick: level searched first; a plan found there is proof.
         full: level that must fail before a violation is called unavoidable.
     """
 
@@ -79,11 +78,11 @@ class Settings:
 
 @dataclass(frozen=True)
 class Motion:
-    """Physics of a record beside its boats.
+    """Physics of a record beyond its boats.
 
     Attributes:
         current_mps: (east, north) speed at which the water carried every boat, m/s.
-        delay_steps: of each boat, steps from a command to its effect; empty: all act at once.
+        delay_steps: steps from a command to its effect, per boat; empty: no delay.
 
     Raises:
         OracleError: a current that is not finite, or a delay that is not a number of steps.
@@ -100,15 +99,15 @@ class Motion:
 
 
 AT_ONCE = Motion()
-"""Still water and commands that act at once."""
+"""Still water and no command delay."""
 
 
 class Outcome(str, Enum):
     """Whether a boat could have kept the radius.
 
-    AVOIDABLE is proved: there are commands, replayed with the full model. UNAVOIDABLE means that the search was
-    exhausted without finding any, at the stated resolution. STARTED_INSIDE: the pair was inside when the record began
-    and never apart before, so that nobody had a chance.
+    AVOIDABLE is proved: a replay with the full model verifies the commands. UNAVOIDABLE: the search found none at the
+    stated resolution. STARTED_INSIDE: the pair was inside when the record began and never apart before the violation,
+    so neither boat had a chance.
     """
 
     __str__ = str.__str__
@@ -132,7 +131,7 @@ class Responsible(str, Enum):
 
     @classmethod
     def of(cls, first: Verdict, second: Verdict, driven: NDArray[np.bool_]) -> Responsible:
-        """Who let the later of both boats' last chances pass; ``driven`` (T, n): boats the game drove in each step."""
+        """Return who let the later last chance pass; ``driven`` (T, n): boats the game controlled in each step."""
         if Outcome.STARTED_INSIDE in (first.outcome, second.outcome):
             return cls.START
         lasts = [(verdict, verdict.last_step) for verdict in (first, second) if verdict.last_step is not None]
@@ -148,15 +147,15 @@ class Responsible(str, Enum):
 
 @dataclass(frozen=True)
 class Plan:
-    """Own commands that keep the radius, proved by replaying them with the full boat model.
+    """Own commands that keep the radius, proved by replay with the full boat model.
 
     Attributes:
         begin_step: index of the state from which the commands act.
         speed_mps: (S,) commanded speed of each step.
-        heading_error_deg: (S,) commanded heading relative to the boat's at that step, in [-180, 180].
+        heading_error_deg: (S,) commanded heading relative to the boat's heading at that step, in [-180, 180].
         heading_deg: (S,) the same command as an absolute heading, clockwise from north, in [-180, 180].
-        path_m: (S+1, 2) where the boat would have gone.
-        closest_m: smallest distance to any other boat on the way, m; above the radius.
+        path_m: (S+1, 2) positions the boat would have had.
+        closest_m: smallest distance to any other boat on the path, m; above the radius.
     """
 
     begin_step: int
@@ -172,20 +171,19 @@ class Verdict:
     """One boat's side of a separation violation.
 
     Attributes:
-        own: index of the boat that is judged.
+        own: index of the judged boat.
         other: index of the boat it came too close to.
         step: index of the first state inside the radius.
         radius_m: separation radius, m.
         outcome: see `Outcome`.
-        last_step: the latest state at which a command could still prevent it; None where there is none.
-        last_preventable_s: how long before the violation that was, s; None where there is none.
-        looked_back_s: how far back commands could begin to differ, s: T, or less where the record is shorter.
+        last_step: the latest state at which a command could still prevent the violation; None if there is none.
+        last_preventable_s: time from that state to the violation, s; None if there is none.
+        looked_back_s: how far back commands could begin to differ, s: T, or less in a shorter record.
         end_step: index of the last state up to which the radius had to be kept.
-        plan: commands given from ``last_step`` on, which act from there on or so much later as the boat's commands
-            come late; None unless avoidable.
-        exhausted: whether the search that found nothing (one step after ``last_step``, or at all) kept every state it
-            reached at its resolution; False when it had to drop some for lack of width.
-        searches: how many searches this took.
+        plan: commands given from ``last_step`` on, which act after the boat's command delay; None unless avoidable.
+        exhausted: whether the failed search (one step after ``last_step``, or all of them) kept every state it reached
+            at its resolution; False if it dropped some for lack of width.
+        searches: number of searches made.
     """
 
     own: int
