@@ -1,9 +1,9 @@
-"""Exact projection onto a small polyhedron, compiled: the reference for the shield's own, and what filters here solve.
+"""Exact projection onto a small polyhedron, compiled: reference for the shield's solver, and solver of these filters.
 
     minimise 1/2 |z - z0|^2   subject to   C z >= d
 
-solved by the dual active-set method of Goldfarb and Idnani (Mathematical Programming 27, 1983, 1-33) with the
-Hessian scaled to the identity. Every answer is exact to rounding, and an infeasible program is told, not guessed.
+The solver is the dual active-set method of Goldfarb and Idnani (Mathematical Programming 27, 1983, 1-33) with the
+Hessian scaled to the identity. Answers are exact to rounding; infeasible programs are reported.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ TOLERANCE = 1e-10
 
 @kernel
 def _dot(a: Array, b: Array) -> float:
-    """Inner product; rows may be slices of a wider array, for which numpy's is slow."""
+    """Return the inner product; rows may be slices of a wider array, for which numpy's version is slow."""
     total = 0.0
     for i in range(a.shape[0]):
         total += a[i] * b[i]
@@ -28,7 +28,7 @@ def _dot(a: Array, b: Array) -> float:
 
 @kernel
 def _direction(C: Array, entering: int, active: IntArray, count: int, gram: Array, r: Array) -> bool:
-    """Change ``r`` of the active multipliers per unit of the entering one: N N^T r = N c; False where rows depend."""
+    """Write ``r``, change of active multipliers per unit of the entering one: N N^T r = N c; False if rows depend."""
     for i in range(count):
         for j in range(i + 1):
             total = _dot(C[active[i]], C[active[j]])
@@ -57,7 +57,7 @@ def _direction(C: Array, entering: int, active: IntArray, count: int, gram: Arra
 def _make_active(
     C: Array, d: Array, z: Array, entering: int, active: IntArray, dual: Array, count: int, gram: Array
 ) -> tuple[int, int]:
-    """Steps until row ``entering`` is satisfied and active; returns the status and the new active count."""
+    """Step until row ``entering`` is satisfied and active; return the status and the new active count."""
     n = C.shape[1]
     r, direction, own = np.zeros(n + 1), np.zeros(n), 0.0
     for _ in range(n + 2):
@@ -67,7 +67,7 @@ def _make_active(
         leaving, dual_step, full_step = -1, np.inf, np.inf
         for i in range(count):
             direction -= r[i] * C[active[i]]
-            if r[i] > 1e-14 and dual[i] / r[i] < dual_step:  # the multiplier that reaches zero first
+            if r[i] > 1e-14 and dual[i] / r[i] < dual_step:  # first multiplier to reach zero
                 leaving, dual_step = i, dual[i] / r[i]
         slope = _dot(direction, C[entering])
         if slope > 1e-12 * _dot(C[entering], C[entering]) and count < n:
@@ -90,11 +90,10 @@ def _make_active(
 
 @kernel
 def project(C: Array, d: Array, z0: Array, z: Array) -> int:
-    """Nearest point to ``z0`` (n,) with ``C z >= d`` (rows of about unit length), written into ``z``.
+    """Write the nearest point to ``z0`` (n,) with ``C z >= d`` (rows of about unit length) into ``z``.
 
     Returns:
-        `OPTIMAL`, `INFEASIBLE`, or `STALLED` when the iteration limit was met or a row is not made of numbers
-        (numerical trouble: do not use).
+        `OPTIMAL`, `INFEASIBLE`, or `STALLED`: iteration limit, dependent rows or NaN; do not use the answer.
     """
     rows, n = C.shape
     copy_row(z, z0)

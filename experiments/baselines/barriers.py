@@ -1,7 +1,7 @@
-"""Barriers of the literature: functions h >= 0 of a pair of boats, their slopes, gains and inputs.
+"""Barriers of the literature: functions h >= 0 of a pair of boats, with gradients, gains and inputs.
 
-Vectors are arrays of their two parts, east and north, of any further shape: p = p_j - p_i, m, and v = v_j - v_i, m/s.
-R is the radius to keep, m, and s = sqrt(|p|^2 - R^2). A row is dh/dt >= -alpha h.
+Vectors are arrays of their two components, east and north, of any further shape: p = p_j - p_i, m, and v = v_j - v_i,
+m/s. R is the required radius, m, and s = sqrt(|p|^2 - R^2). A pair's constraint is dh/dt >= -alpha h.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from steerclear.shield.jit import Array
 
 Gains = tuple[float, ...]
 Jet = tuple[Array, Array, Array]
-"""h, and its derivatives along p and along what the inputs act on: v, or p where they are velocities."""
+"""h, and its gradients in p and in what the inputs act on: v, or p if the inputs are velocities."""
 NEAREST_M2, STILL_MPS = 1e-4, 1e-6
-"""s^2 is cut from below there, with derivative 0, and |v| is smoothed by that: the papers leave both open."""
+"""Lower bound of s^2 (derivative 0 below it), and smoothing of |v|: the papers leave both open."""
 WIDENED = 1.05
 RATES_PER_S = (0.025, 0.05, 0.075, 0.1, 0.15, 0.2, 0.35, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 20.0)
 
 
 class Barrier(NamedTuple):
-    """A barrier of the literature: its ``jet`` (p, v, R, *gains of its own) and its gains, alpha (1/s) the first.
+    """A barrier of the literature: its ``jet`` (p, v, R, *further gains) and its gains, alpha (1/s) first.
 
-    They are ``tuned`` by platform, the winners of `sweep` of those ``tried``, of which the first are every other
-    platform's. Inputs are velocities, or those of `unicycle`; the radius is ``widened`` by a factor.
+    ``tuned``: gains by platform, the winners of `sweep` among those ``tried``; other platforms use the first of
+    ``tried``. Inputs are velocities (``of_velocity``) or those of `unicycle`; the radius is multiplied by ``widened``.
     """
 
     jet: Callable[..., Jet]
@@ -38,57 +38,59 @@ class Barrier(NamedTuple):
 
 
 def dot(a: Array, b: Array) -> Array:
-    """Inner product."""
+    """Return the inner product."""
     return np.asarray(a[0] * b[0] + a[1] * b[1])
 
 
 def tangent(p: Array, radius_m: float) -> tuple[Array, Array]:
-    """s, the length of the tangent from p to the circle of the radius, m, and k of its derivative k p."""
+    """Return s, the length of the tangent from p to the circle of the radius, m, and k of its derivative k p."""
     square = dot(p, p) - radius_m * radius_m
     s = np.sqrt(np.maximum(square, NEAREST_M2))
     return s, np.where(square > NEAREST_M2, 1.0 / s, 0.0)
 
 
 def pace(v: Array) -> Array:
-    """|v|, smoothed, m/s."""
+    """Return |v|, smoothed, m/s."""
     return np.asarray(np.sqrt(dot(v, v) + STILL_MPS * STILL_MPS))
 
 
 def velocity_cbf(p: Array, v: Array, radius_m: float) -> Jet:
-    """The distance, of boats whose velocity u is their input: h, m^2, and its derivatives.
+    """Return the distance barrier of boats whose velocity u is their input: h, m^2, and its gradients.
 
-    h = |p|^2 - R^2, row <dh/dp, u_j - u_i> >= -alpha h. Ames et al. 2019 (ECC); pairwise as Wang, Ames, Egerstedt 2017
-    (T-RO).
+    h = |p|^2 - R^2, constraint <dh/dp, u_j - u_i> >= -alpha h. Ames et al. 2019 (ECC); pairwise as Wang, Ames,
+    Egerstedt 2017 (T-RO).
     """
     return dot(p, p) - radius_m * radius_m, 2.0 * p, 2.0 * p
 
 
 def exponential_cbf(p: Array, v: Array, radius_m: float, a1: Array) -> Jet:
-    """The distance made exponential, for boats that accelerate: h, m^2/s, and its derivatives; a1 in 1/s, alpha is a2.
+    """Return the exponential distance barrier for boats that accelerate: h, m^2/s, and gradients; a1, 1/s; alpha is a2.
 
-    h = d/dt (|p|^2 - R^2) + a1 (|p|^2 - R^2): its own row is the barrier. Nguyen, Sreenath 2016 (ACC); with linear
-    class-K functions also the barrier of Xiao, Belta 2021 (TAC).
+    h = d/dt (|p|^2 - R^2) + a1 (|p|^2 - R^2). Nguyen, Sreenath 2016 (ACC); with linear class-K functions also the
+    barrier of Xiao, Belta 2021 (TAC).
     """
     return 2.0 * dot(p, v) + a1 * (dot(p, p) - radius_m * radius_m), 2.0 * (v + a1 * p), 2.0 * p
 
 
 def collision_cone(p: Array, v: Array, radius_m: float) -> Jet:
-    """The relative velocity stays out of the cone of courses that pass within the radius: h, m^2/s, and derivatives.
+    """Return the collision-cone barrier: h, m^2/s, and its gradients.
 
-    h = <p, v> + |v| s, which is <p, v> + |p| |v| cos(phi), phi half the angle of the cone. Thontepu et al. 2022, arXiv
-    2209.11524.
+    The relative velocity stays out of the cone of courses that pass within the radius: h = <p, v> + |v| s, which is
+    <p, v> + |p| |v| cos(phi), phi half the angle of the cone. Thontepu et al. 2022, arXiv 2209.11524.
     """
     (s, k), speed = tangent(p, radius_m), pace(v)
     return dot(p, v) + speed * s, v + speed * k * p, p + s * v / speed
 
 
 def parabolic(p: Array, v: Array, radius_m: float, lambda_share: Array, mu_share: Array) -> Jet:
-    """Closing in along the line of sight is bounded by the distance and by the speed across it: h, m/s, derivatives.
+    """Return the parabolic barrier: h, m/s, and its gradients.
 
-    h = v_x + k_l s/|v| v_y^2 + k_m s, (v_x, v_y) = v along and across p. Park et al. 2025, arXiv 2510.01402. The
-    formula is from what its authors published with the paper, the README and the class ``KinematicBicycle2D_DPCBF`` of
-    their library safe_control; equation numbers of the paper are therefore not cited. k_l (1/m) and k_m (1/s) are gains
-    times sqrt(w^2 - 1)/R, and R is widened by the factor w, s in that library. With n across the line of sight e,
+    It bounds the closing speed along the line of sight by the distance and by the speed across it:
+    h = v_x + k_l s/|v| v_y^2 + k_m s, (v_x, v_y) = v along and across p. Park et al. 2025, arXiv 2510.01402.
+
+    The formula is from what its authors published with the paper: the README and class ``KinematicBicycle2D_DPCBF`` of
+    their library safe_control. Equation numbers of the paper are therefore not cited. k_l (1/m) and k_m (1/s) are gains
+    times sqrt(w^2 - 1)/R; R is widened by the factor w, s in that library. With n across the line of sight e,
     dv_x/dp = v_y n/|p| and dv_y/dp = -v_x n/|p|.
     """
     unit = math.sqrt(WIDENED**2 - 1.0) / radius_m
@@ -123,4 +125,4 @@ BARRIERS = {
         widened=WIDENED,
     ),
 }
-"""Those that are compared, by name; another entry is another guard."""
+"""Compared barriers by name; each entry is one safety filter."""

@@ -1,4 +1,4 @@
-"""What safety filters of a batch of games share: checks of what they are given, and the arrays they answer with."""
+"""Common base of batched safety filters: input checks and output arrays."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from steerclear.shield.platforms import layout as L
 
 
 class Games(NamedTuple):
-    """What is decided about, and what is written, of B games of n boats, or of one of them; see `BatchFilter`."""
+    """Inputs and outputs of B games of n boats, or of one game; see `BatchFilter`."""
 
     state: Array
     nominal: Array
@@ -28,13 +28,13 @@ class Games(NamedTuple):
 
 @kernel
 def game_of(games: Games, b: int) -> Games:
-    """One of the games: arrays without the leading games axis."""
+    """Return one game: arrays without the leading games axis."""
     state, nominal, ours, memory, filtered, reason, safety_margin_m = games
     return Games(state[b], nominal[b], ours[b], memory[b], filtered[b], reason[b], safety_margin_m[b])
 
 
 class BatchFilter(ABC):
-    """Commands of B games of the same fleet, filtered in the place where the batched shield stands.
+    """Filter of the commands of B games of the same fleet, with the interface of the batched shield.
 
     Args:
         name: of the filter, for messages.
@@ -45,10 +45,10 @@ class BatchFilter(ABC):
 
     Attributes:
         reason: (B, n) why each command is what it is.
-        safety_margin_m: (B, n) margin left, m, inf where nobody is near.
-        filtered: (B, n, 2) the commands of the last decision.
-        memory: (B, n, columns) what is kept of each boat between decisions.
-        radius_m: distance to keep: separation, buffer and both position errors, m.
+        safety_margin_m: (B, n) margin left, m; inf where no boat is near.
+        filtered: (B, n, 2) commands of the last decision.
+        memory: (B, n, columns) what the filter remembers of each boat between decisions.
+        radius_m: required distance: separation, buffer and both position errors, m.
         params: (n, N_PARAM) platform rows.
 
     Raises:
@@ -56,7 +56,7 @@ class BatchFilter(ABC):
     """
 
     columns, forgotten, needs_commands = 0, 0.0, True
-    """Columns of the memory, what is in them at first, and whether every boat of ours needs a usable command."""
+    """Columns of the memory, their initial value, and whether every own boat needs a usable command."""
 
     def __init__(
         self, name: str, config: ShieldConfig, games: int, platforms: tuple[str | Platform, ...], team: tuple[int, ...]
@@ -81,7 +81,7 @@ class BatchFilter(ABC):
         self.reason[which], self.safety_margin_m[which], self.memory[which] = 0, np.inf, self.forgotten
 
     def decide(self, state: Array, nominal: Array, ours: BoolArray) -> Array:
-        """Filtered commands.
+        """Return the filtered commands.
 
         Args:
             state: (B, n, N_STATE) boat states.
@@ -89,10 +89,10 @@ class BatchFilter(ABC):
             ours: (B, n) boats to decide for.
 
         Returns:
-            (B, n, 2) commands, reused by the next call. ``reason`` and ``safety_margin_m`` (B, n) tell why.
+            (B, n, 2) commands, overwritten by the next call. ``reason`` and ``safety_margin_m`` (B, n) explain them.
 
         Raises:
-            FleetError: an array has the wrong shape, a state is not finite, or what else the filter cannot decide on.
+            FleetError: an array has the wrong shape, a state is not finite, or the filter cannot decide on the input.
         """
         shapes = {"state": (*self.reason.shape, L.N_STATE), "nominal": self.filtered.shape, "ours": self.reason.shape}
         for (what, shape), array in zip(shapes.items(), (state, nominal, ours), strict=True):
@@ -110,4 +110,4 @@ class BatchFilter(ABC):
 
     @abstractmethod
     def _decide(self, games: Games) -> None:
-        """Write commands, reasons and margins; commands are the nominal ones so far, and the arrays contiguous."""
+        """Write commands, reasons and margins; ``filtered`` starts as the nominal commands; arrays are contiguous."""

@@ -1,25 +1,26 @@
-"""PL-CBF: a library of fallback policies rolled out, one row of a quadratic program for the mode taken. Compiled.
+"""PL-CBF: rollouts of a library of fallback policies, and one constraint of a quadratic program for the chosen mode.
 
 Source: Kim, Okamoto, Hoxha, Fainekos, Panagou, "Policy Library CBF: Finite-Horizon Safety at Runtime via Parallel
-Rollouts" (arXiv 2605.16588), and the code its authors published (github.com/tkkim-robot/plcbf). The value of a policy
-m is the least clearance of its rollout, V_m(x) = min over t in [0, T] of h(x_m(t)). Of the policies with V_m > 0 the
-least invasive is taken, where there is none that of the greatest value, and the program is
+Rollouts" (arXiv 2605.16588), and its authors' code (github.com/tkkim-robot/plcbf). The value of a policy m is the
+least clearance of its rollout, V_m(x) = min over t in [0, T] of h(x_m(t)). The least invasive policy with V_m > 0 is
+chosen; if there is none, the policy of greatest value. The program is
 
     minimise |u - u_nominal|^2   subject to   dV_m/dt >= -alpha V_m,   limits of u.
 
-Where it has no answer, or one that does not keep the row, the boat follows the policy itself, as in the authors' code.
-The row is held against the boat's own model: of a boat whose rudder swings from side to side a line says too little.
+If it has no answer, or the answer violates the constraint on the boat's own model, the boat follows the policy itself,
+as in the authors' code. The check on the model is needed because a linear constraint says too little about a boat whose
+rudder swings from side to side.
 
-What the paper leaves to the user, and what stands here:
+The paper leaves these choices to the user:
 
-| left open | here |
+| left open | choice here |
 | --- | --- |
-| library | the nominal command held; the mode taken last, anchored as it was; `rollouts.LIBRARY` from the heading now |
+| library | the nominal command held; the mode chosen last, as anchored then; `rollouts.LIBRARY` from the heading now |
 | inputs u | acceleration and turn rate as shares of braking and of the largest turn now, as the textbook filters have |
 | dV_m/dt | the step of the sampled boat, (V_m(x+) - V_m(x)) / dt, x+ by hull and autopilot, others one step on |
 | its gradient in u | finite differences of V_m(x+) by `DIFFERENCE` of each input |
-| least invasive | the row that leaves the largest part of the inputs, as in the authors' code |
-| several agents | opponents hold course; teammates hold what they were told last, or in this step if decided for |
+| least invasive | the constraint that leaves the largest part of the inputs, as in the authors' code |
+| several agents | opponents hold course; teammates hold their last command, or this step's if already decided |
 """
 
 from __future__ import annotations
@@ -42,15 +43,15 @@ PASSED, CHANGED, POLICY = 0, 1, 2
 NOMINAL, LAST, BEFORE = 0, 1, 2
 """The first modes, and how many come before the library's.
 
-The mode taken last stays among them, in columns 1 and 2 of a plan: the library turns with the boat, and what was safe
-would otherwise be lost in the next step.
+The mode chosen last is one of them (columns 1 and 2 of a plan). The library turns with the boat, so a safe mode would
+otherwise be lost in the next step.
 """
 CORNERS = ((0, 0), (1, 0), (1, 1), (0, 1))
 DIFFERENCE = 0.1
 SLACK_M = 1e-3
-"""How far an answer may miss its row by the boat's model, m in a step."""
+"""How far an answer may miss its constraint on the boat's model, m in a step."""
 SAME = 1e-9
-"""Inputs this near to the nominal ones are the nominal ones."""
+"""Inputs this near to the nominal ones count as equal."""
 
 
 class Inputs(NamedTuple):
@@ -63,9 +64,9 @@ class Inputs(NamedTuple):
 
 @kernel
 def share_left(row: Array, need: float, box: Array) -> float:
-    """Share in [0, 1] of the box (2, 2; least and greatest of each input) in which ``row z >= need``.
+    """Return the share in [0, 1] of the box (2, 2; least and greatest of each input) in which ``row z >= need``.
 
-    A box without width in an input is measured in the other; one that is a single point counts as all or nothing.
+    If one input has no width, the share is measured in the other; a single point counts as all or nothing.
     """
     if box[0, 1] <= box[0, 0] or box[1, 1] <= box[1, 0]:
         return _share_of_line(row, need, box)
@@ -99,7 +100,7 @@ def _share_of_line(row: Array, need: float, box: Array) -> float:
 
 @kernel
 def value_of(setup: R.Setup, i: int, start: Array, k: int, speed: float, heading: float, around: R.Around) -> float:
-    """V of a policy, a command held from step k on in the state ``start``: least clearance over the horizon, m."""
+    """Return V of a policy, a command held from step k on in state ``start``: least clearance over the horizon, m."""
     row = start.copy()
     least = R.gap_at(setup, around, k, row[L.X], row[L.Y])
     for t in range(1, setup.steps + 1):
@@ -110,7 +111,7 @@ def value_of(setup: R.Setup, i: int, start: Array, k: int, speed: float, heading
 
 @kernel
 def answer_of(row: Array, need: float, box: Array, z0: Array, z: Array) -> bool:
-    """Write the nearest inputs to ``z0`` within the box that meet ``row z >= need``; whether there are any."""
+    """Write the inputs nearest to ``z0`` within the box with ``row z >= need``; return whether there are any."""
     z[:] = z0
     length = math.hypot(row[0], row[1])
     if row[0] * z0[0] + row[1] * z0[1] >= need:
@@ -127,7 +128,7 @@ def answer_of(row: Array, need: float, box: Array, z0: Array, z: Array) -> bool:
 
 @kernel
 def _command_of_mode(setup: R.Setup, i: int, m: int, state: Array, nominal: Array, plan: Array) -> tuple[float, float]:
-    """Speed and absolute heading of mode m: the nominal command held, the mode taken last, then the library."""
+    """Return speed and absolute heading of mode m: nominal command held, last mode, then the library."""
     if m == NOMINAL:
         return nominal[0], wrap_degrees(state[L.HEADING] + nominal[1])
     if m == LAST:
@@ -137,7 +138,7 @@ def _command_of_mode(setup: R.Setup, i: int, m: int, state: Array, nominal: Arra
 
 @kernel
 def _later_states(setup: R.Setup, i: int, state: Array, inputs: Inputs, later: Array) -> Array:
-    """Write the states (4, N_STATE) now, after the nominal inputs, and with either shifted; returns the shifts (2,)."""
+    """Write states (4, N_STATE): now, after nominal inputs, and with either input shifted; return the shifts (2,)."""
     shift = np.empty(2)
     later[0] = state
     for k in range(3):
@@ -156,9 +157,10 @@ def _later_states(setup: R.Setup, i: int, state: Array, inputs: Inputs, later: A
 def take_mode(
     setup: R.Setup, i: int, state: Array, nominal: Array, plan: Array, inputs: Inputs, around: R.Around, row: Array
 ) -> tuple[int, float, float]:
-    """The mode taken, its row (written), right-hand side and value; safe ones first, by how little they take, then V.
+    """Choose a mode: safe ones first, by the share of inputs their row leaves, then by V.
 
-    What a mode leaves is the share of the inputs in which its row holds.
+    Returns:
+        The mode, the right-hand side of its row and its value; the row is written into ``row``.
     """
     z0, later, trial, values = inputs.z0, np.empty((4, L.N_STATE)), np.empty(2), np.empty(4)
     shift = _later_states(setup, i, state, inputs, later)
@@ -181,13 +183,13 @@ def take_mode(
             best, best_need, best_value, best_score = m, need, value, score
             row[:] = trial
         if value > 0.0 and row[0] * z0[0] + row[1] * z0[1] >= best_need and best_score >= 1.0 - SAME:
-            break  # takes nothing away: no other mode can do better
+            break  # removes no inputs: no other mode can be better
     return best, best_need, best_value
 
 
 @kernel
 def _decide_boat(setup: R.Setup, i: int, state: Array, around: R.Around, plan: Array, out: Array) -> tuple[int, float]:
-    """Take a mode, note it in the plan, solve its program; returns why the command is what it is, and the value, m."""
+    """Choose a mode, record it in the plan and solve its program; return the reason and the value, m."""
     params, limits = setup.params[i], setup.limits[i]
     box, z0, z, row = np.empty((2, 2)), np.empty(2), np.empty(2), np.empty(2)
     unit = inputs_of_command(params, limits, state, out, setup.dt_s, z0, box)
@@ -208,7 +210,7 @@ def _decide_boat(setup: R.Setup, i: int, state: Array, around: R.Around, plan: A
 
 @kernel
 def decide_game(setup: R.Setup, game: Games) -> None:
-    """Decide for the boats of ours, one after the other; ``filtered`` starts as the nominal commands."""
+    """Decide for the own boats, one after the other; ``filtered`` starts as the nominal commands."""
     state, _, ours, plan, filtered, reason, clear_m = game
     n, steps = state.shape[0], setup.steps + 1
     path, grow, near = np.empty((n, steps + 1, 2)), np.empty(n), np.empty(n, np.bool_)
@@ -228,7 +230,7 @@ def decide_game(setup: R.Setup, game: Games) -> None:
 
 @kernel
 def decide_games(setup: R.Setup, games: Games) -> None:
-    """`decide_game` for every game; arrays carry a leading games axis, and the memory is the boats' plans."""
+    """Run `decide_game` for every game; arrays carry a leading games axis, and the memory holds the boats' plans."""
     for b in range(len(games.state)):
         decide_game(setup, game_of(games, b))
 
@@ -236,8 +238,7 @@ def decide_games(setup: R.Setup, games: Games) -> None:
 class PolicyLibrary(R.RolloutFilter):
     """PL-CBF.
 
-    Settings: ``horizon_s``, length of a rollout (T of the paper), and ``alpha_per_s``, rate of the row
-    dV/dt >= -alpha V.
+    Settings: ``horizon_s``, length of a rollout (T of the paper), and ``alpha_per_s``, rate of dV/dt >= -alpha V.
     """
 
     defaults: ClassVar[dict[str, Any]] = {"horizon_s": 10.0, "alpha_per_s": 1.0}

@@ -1,16 +1,16 @@
-"""`ReachFilter`: a safety filter of the reachability value tables alone, in the place where the shield stands.
+"""`ReachFilter`: a safety filter from the reachability value tables alone, with the batched shield's interface.
 
-Margins of pairs of boats are h_ij = V(x_i, x_j) - R, V the distance that can be kept from now on by the value tables:
-against the worst an opponent can do within the adversary horizon, or with the help of a teammate. Within a step, of
-which the tables say nothing, opponents move in each of three ways, and the least of the three values counts.
+Margins of pairs of boats are h_ij = V(x_i, x_j) - R. By the value tables, V is the distance that can be kept from now
+on: against the worst an opponent can do within the adversary horizon, or with the help of a teammate. The tables do
+not cover motion within a step, so opponents move in each of three ways, and the least of the three values counts.
 
-One decision for all boats of ours in a game: screen, program, exact check, else the rudder of greatest value. The
+One decision covers all own boats in a game: nominal check, program, exact check, else the rudder of greatest value. The
 inputs of boat i are z_t = turn / full turn of this step and z_s = sqrt(speed_weight) * speed command / top speed.
-With x+ the state after a candidate, the least change meets, for each pair and each way an opponent may move,
+With x+ the state after a candidate, the least change satisfies, for each pair and each way an opponent may move,
 
     V(x+) + dV/dpsi (psi - psi+) + dV/dv (v - v+) >= R + target,   target = max(0, e^(-response dt) min(h(x), cap)),
 
-with the same terms of a teammate decided for together. It counts when h(x+) >= target after it by the full model.
+with the same terms of a teammate decided together. It is accepted if h(x+) >= target by the full model.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ from .active_set import OPTIMAL, project
 from .base import BatchFilter, Games, game_of
 
 WAYS = 3
-"""Ways an opponent may move in a step: straight on, and with full rudder to port and to starboard."""
+"""Ways an opponent may move in a step: straight on, full rudder to port, full rudder to starboard."""
 
 
 class Setup(NamedTuple):
-    """Constants of n boats: tables, that of each pair (n, n), platform rows, teams, full turns (n,) deg; settings."""
+    """Constants of n boats: tables, index by pair (n, n), platform rows, teams, full turns (n,) deg, settings."""
 
     tables: Tables
     table: IntArray
@@ -59,10 +59,10 @@ class Setup(NamedTuple):
 
 @kernel
 def near_pairs(setup: Setup, state: Array, ours: BoolArray) -> IntArray:
-    """Pairs (m, 4) within their table's range: boat i of ours, boat j, and which of j's states of `ahead` count.
+    """Return pairs (m, 4) within their table's range: own boat i, boat j, and which of j's states of `ahead` count.
 
-    These are, from the first to before the last: the one under its commands, if both are decided for together (which
-    is a pair once), every way of an opponent, and the first of another teammate.
+    The states are given as first and end (exclusive): the state under j's commands if both are decided together (listed
+    once), every way of an opponent, or the first way of another teammate.
     """
     pairs, m = np.zeros((setup.table.size, 4), np.int64), 0
     for i, j in np.ndindex(setup.table.shape):
@@ -79,7 +79,7 @@ def near_pairs(setup: Setup, state: Array, ours: BoolArray) -> IntArray:
 
 @kernel
 def ahead(setup: Setup, state: Array, ours: BoolArray, commands: Array, steps: int) -> Array:
-    """States (n, WAYS + 1, N_STATE) of boats after some steps: as opponents, and, of ours, under their commands."""
+    """Return states (n, WAYS + 1, N_STATE) after some steps: boats as opponents, and own boats under their commands."""
     x = np.empty((len(state), WAYS + 1, L.N_STATE))
     for j, way in np.ndindex(x.shape[:2]):
         params = setup.params[j]
@@ -96,14 +96,14 @@ def ahead(setup: Setup, state: Array, ours: BoolArray, commands: Array, steps: i
 
 @kernel
 def seen(own: Array, other: Array) -> tuple[float, float, float, float, float, float]:
-    """What a table is asked with: offset of the other boat, m, both headings, rad, and speeds, m/s."""
+    """Return the arguments of a table: offset of the other boat, m, both headings, rad, and speeds, m/s."""
     x, y = other[L.X] - own[L.X], other[L.Y] - own[L.Y]
     return x, y, math.radians(own[L.HEADING]), math.radians(other[L.HEADING]), own[L.SPEED], other[L.SPEED]
 
 
 @kernel
 def margins(setup: Setup, pairs: IntArray, x: Array) -> Array:
-    """Margins (m,) of pairs in the states ``x`` of `ahead`, m."""
+    """Return margins (m,) of pairs in the states ``x`` of `ahead`, m."""
     h = np.full(len(pairs), np.inf)
     for r in range(len(pairs)):
         i, j, first, last = pairs[r, 0], pairs[r, 1], pairs[r, 2], pairs[r, 3]
@@ -117,7 +117,7 @@ def margins(setup: Setup, pairs: IntArray, x: Array) -> Array:
 
 @kernel
 def least(pairs: IntArray, h: Array, boats: int) -> Array:
-    """Least (n,) of what is given of pairs, (m,), for the boats of ours in them."""
+    """Return the least (n,) of pair values (m,) for each own boat."""
     low = np.full(boats, np.inf)
     for r in range(len(pairs)):
         for i in pairs[r, : 2 if pairs[r, 2] == WAYS else 1]:
@@ -128,7 +128,7 @@ def least(pairs: IntArray, h: Array, boats: int) -> Array:
 
 @kernel
 def mark_safe(setup: Setup, state: Array, ours: BoolArray, safe: BoolArray) -> None:
-    """Mark (B, n) own boats whose pairs all have a value of at least the radius.
+    """Mark own boats whose pairs all have a value of at least the radius.
 
     Args:
         setup: tables and radius.
@@ -145,14 +145,14 @@ def mark_safe(setup: Setup, state: Array, ours: BoolArray, safe: BoolArray) -> N
 
 
 ROUNDS, SWEEPS = 2, 2
-"""Times the program is linearised and solved; times the boats choose backups, each knowing the others' choices."""
+"""Linearisations of the program; sweeps in which boats choose backups, each knowing the others' choices."""
 AIM_M, SAME = 0.01, 1e-6
-"""Rows aim this much beyond the target, for the curvature of V; smaller changes of inputs are none."""
+"""Excess of constraints over the target, m, for the curvature of V; smallest change of inputs that counts."""
 HYSTERESIS_M = 0.3
 """Value, m, by which a backup to the other side must be better."""
 
 BACKUPS = np.array([(k / 4.0, 1.0) for k in range(5)] + [(0.0, 0.0)] + [(k / 4.0, 1.0) for k in range(-4, 0)])
-"""Rudder to starboard as a share of full, and speed as a share of top speed; the first of the best is taken."""
+"""Rudder to starboard as a share of full, and speed as a share of top speed; the first of the best is chosen."""
 
 
 @kernel
@@ -170,7 +170,7 @@ def _effects(setup: Setup, i: int, state: Array, command: Array, later: Array, z
 
 @kernel
 def _rows(setup: Setup, pairs: IntArray, need_m: Array, x: Array, effect: Array, z: Array) -> tuple[Array, Array]:
-    """Rows C z >= d, of unit length: of pairs V >= ``need_m`` (m,), and the limits of the inputs."""
+    """Return constraints C z >= d of unit length: V >= ``need_m`` (m,) of pairs, and the limits of the inputs."""
     n, most_speed = len(z), math.sqrt(setup.speed_weight)
     C, d, r = np.zeros((WAYS * len(pairs) + 2 * n, n)), np.zeros(WAYS * len(pairs) + 2 * n), 0
     for m in range(len(pairs)):
@@ -188,7 +188,7 @@ def _rows(setup: Setup, pairs: IntArray, need_m: Array, x: Array, effect: Array,
                 square += row[c] * row[c]
                 d[r] += row[c] * z[c]
                 most += abs(row[c]) * (2.0 if c % 2 == 0 else most_speed)
-            if square >= 1e-18 and lack + most >= 0.0:  # else no inputs can break or change it
+            if square >= 1e-18 and lack + most >= 0.0:  # otherwise no inputs can violate or change it
                 length = math.sqrt(square)
                 d[r] /= length
                 row /= length
@@ -203,7 +203,7 @@ def _rows(setup: Setup, pairs: IntArray, need_m: Array, x: Array, effect: Array,
 
 @kernel
 def _program(setup: Setup, game: Games, pairs: IntArray, target: Array, asked: Array, h: Array) -> bool:
-    """Write commands by the least change of the inputs, and the margins after them; whether all targets are kept."""
+    """Write commands by the least change of inputs, and margins after them; return whether all targets hold."""
     state, ours, filtered, n = game.state, np.flatnonzero(game.ours), game.filtered, len(game.ours)
     z0, z, now, effect = np.zeros(2 * n), np.zeros(2 * n), np.zeros(2 * n), np.zeros((n, 2))
     for attempt in range(ROUNDS):
@@ -233,7 +233,7 @@ def _program(setup: Setup, game: Games, pairs: IntArray, target: Array, asked: A
 
 @kernel
 def _follow(setup: Setup, i: int, backup: Array, row: Array) -> tuple[float, float]:
-    """Move boat i's state on by ``look`` steps of a backup; returns its first command."""
+    """Advance boat i's state by ``look`` steps of a backup; return its first command."""
     params, speed, first = setup.params[i], backup[1] * setup.params[i, L.MAX_SPEED], 0.0
     for step in range(setup.look):
         heading = command_for_turn(params, row, speed, backup[0] * setup.full_deg[i], setup.dt_s)
@@ -244,9 +244,9 @@ def _follow(setup: Setup, i: int, backup: Array, row: Array) -> tuple[float, flo
 
 @kernel
 def _take_backups(setup: Setup, game: Games, pairs: IntArray, movers: BoolArray) -> None:
-    """Give the movers (n,) the backups of greatest value after ``look`` steps; others go by their commands.
+    """Give the movers (n,) the backups of greatest value after ``look`` steps; other boats follow their commands.
 
-    A boat changes the side it turns to, which is kept of it, only for what is clearly better.
+    The memory holds the side to which a boat turns; it changes sides only for a clearly better backup.
     """
     state, filtered, side = game.state, game.filtered, game.memory[:, 0]
     x = ahead(setup, state, game.ours, filtered, setup.look)
@@ -271,7 +271,7 @@ def _take_backups(setup: Setup, game: Games, pairs: IntArray, movers: BoolArray)
 
 @kernel
 def _short(pairs: IntArray, left_m: Array, movers: BoolArray) -> bool:
-    """Add the boats whose pairs have less than nothing left of their targets to the movers; whether there were any."""
+    """Add boats with a pair below its target to the movers; return whether there were any."""
     more = ~movers & ~(least(pairs, left_m, len(movers)) >= 0.0)
     movers[:] = movers | more
     return bool(more.any())
@@ -279,7 +279,7 @@ def _short(pairs: IntArray, left_m: Array, movers: BoolArray) -> bool:
 
 @kernel
 def decide_game(setup: Setup, game: Games) -> None:
-    """Decide for the boats of ours in one game, (n, ...) each."""
+    """Decide for the own boats in one game, arrays (n, ...)."""
     state, nominal, ours, memory, filtered, reason, safety_margin_m = game
     n = len(ours)
     for i in range(n):
@@ -298,7 +298,7 @@ def decide_game(setup: Setup, game: Games) -> None:
                 reason[i] = LEAST_CHANGE
     elif moved:
         filtered[:] = asked
-        while moved:  # who falls short by what others do now backs away, too
+        while moved:  # boats below their target because of the new backups take one, too
             _take_backups(setup, game, pairs, movers)
             copy_row(h, margins(setup, pairs, ahead(setup, state, ours, filtered, 1)))
             moved = _short(pairs, h - target, movers)
@@ -312,7 +312,7 @@ def decide_game(setup: Setup, game: Games) -> None:
 
 @kernel
 def decide_games(setup: Setup, games: Games) -> None:
-    """`decide_game` for every game."""
+    """Run `decide_game` for every game."""
     for b in range(len(games.state)):
         decide_game(setup, game_of(games, b))
 
@@ -323,15 +323,15 @@ SETTINGS = ("cbf_rate_per_s", "margin_cap_m", "speed_weight", "adversary_horizon
 
 
 class ReachFilter(BatchFilter):
-    """Commands kept where the value tables promise the separation; what is not said here is as in `BatchFilter`.
+    """Filter that keeps the separation promised by the value tables; see `BatchFilter`.
 
     Reasons are the shield's: 0 passed bit for bit, 1 changed by the program, 3 backup, 4 best effort (no rudder and no
     braking keeps the separation), 5 no usable command, so the boat holds, 6 not decided for. ``safety_margin_m`` is the
-    least value after this step less the radius kept, m, inf where nobody is within the tables' range. Static
-    constraints and the field's edge are not kept clear of.
+    least value after this step less the required radius, m; inf if no boat is within the tables' range. The filter does
+    not avoid static obstacles or the field's edge.
 
     Raises:
-        ConfigError: a pair of boats without a table, a fleet that does not fit, a radius the tables cannot tell, or a
+        ConfigError: a pair of boats without a table, a fleet that does not fit, a radius beyond the tables' range, or a
             delay.
     """
 
@@ -342,7 +342,7 @@ class ReachFilter(BatchFilter):
         """Check settings given with the name.
 
         Raises:
-            ConfigError: one that this filter has no use for, or a bad value.
+            ConfigError: a setting that this filter does not use, or a bad value.
         """
         for key in settings:
             if key not in SETTINGS:
@@ -381,7 +381,7 @@ class ReachFilter(BatchFilter):
 
 
 def _tables(platforms: list[Platform], team: tuple[int, ...]) -> tuple[list[ValueTable], IntArray]:
-    """Tables of all pairs, each once, and which is whose."""
+    """Return the tables of all pairs, each once, and the table index of each pair (n, n)."""
     index, found = np.full((len(team), len(team)), -1), dict[tuple[Platform, Platform, OtherMay], ValueTable]()
     for i, j in permutations(range(len(team)), 2):
         key = platforms[i], platforms[j], OtherMay.COOPERATIVE if team[i] == team[j] else OtherMay.WORST_CASE

@@ -1,4 +1,4 @@
-"""Safety filters by name, as ``--filter`` takes them: the shield, and those of the literature."""
+"""Safety filters by name, as ``--filter`` takes them: the shield, and filters of the literature."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ GIVEN = {
     "current_mps": "--current",
     "dt_s": "no option",
 }
-"""Settings that the conditions of a run decide."""
+"""Settings that follow from the conditions of a run."""
 
 
 class SafetyFilter(Protocol):
-    """What filters the commands of a batch of games; the batched shield is one."""
+    """Protocol of a filter of the commands of a batch of games; the batched shield is one."""
 
     @property
     def reason(self) -> IntArray:
@@ -45,34 +45,34 @@ class SafetyFilter(Protocol):
 
     @property
     def safety_margin_m(self) -> Array:
-        """(B, n) margin left, m, of the last decision; inf where nobody is near."""
+        """(B, n) margin left, m, of the last decision; inf where no boat is near."""
         ...
 
     def decide(self, state: Array, nominal: Array, ours: BoolArray) -> Array:
-        """Commands (B, n, 2), speed m/s and relative heading deg, for the boats of ``ours`` (B, n)."""
+        """Return commands (B, n, 2), speed m/s and relative heading deg, for the boats of ``ours`` (B, n)."""
         ...
 
 
 FilterMaker = Callable[[ShieldConfig, int, tuple[str, ...], tuple[int, ...], Surroundings], SafetyFilter]
-"""From settings, games, platforms, teams and static constraints to a safety filter."""
+"""Makes a safety filter from settings, number of games, platforms, teams and static constraints."""
 
 
 class NoFilter:
-    """Passes every command."""
+    """Filter that passes every command."""
 
     def __init__(self, games: int, boats: int) -> None:
         self.reason = np.zeros((games, boats), np.int64)
         self.safety_margin_m = np.full((games, boats), np.inf)
 
     def decide(self, state: Array, nominal: Array, ours: BoolArray) -> Array:
-        """The nominal commands themselves."""
+        """Return the nominal commands themselves."""
         return nominal
 
 
 class Entry(NamedTuple):
-    """A filter that has a name: made from what a `FilterMaker` takes and the settings given with the name.
+    """A named filter, made from the arguments of a `FilterMaker` and the settings given with the name.
 
-    ``check`` refuses settings (None: it takes none); ``of_config``: they are those of `ShieldConfig`.
+    ``check`` rejects bad settings (None: the filter takes none); ``of_config``: they are settings of `ShieldConfig`.
     """
 
     make: Callable[..., SafetyFilter]
@@ -92,14 +92,14 @@ FILTERS: dict[str, Entry] = {
     "pl-cbf": _rollouts(PolicyLibrary, "pl-cbf"),
     **{name: Entry(lambda *fleet, name=name: TextbookFilter(name, *fleet[:4])) for name in BARRIERS},
 }
-"""Every filter, by name: an entry here makes one a value of ``--filter``."""
+"""Every filter by name; each entry is a value of ``--filter``."""
 
 
 def parse_filters(text: str) -> list[str]:
-    """Split names of filters at commas; ``shield:a=1,b=2,none`` is two: a piece ``b=2`` belongs to what is before.
+    """Split names of filters at commas; ``shield:a=1,b=2,none`` is two: a piece ``b=2`` belongs to the name before it.
 
     Raises:
-        ConfigError: no name, one that is not known, or settings that it refuses.
+        ConfigError: no name, an unknown one, or settings that the filter rejects.
     """
     names = [piece for piece in re.split(r",(?!\w+=)", "".join(text.split())) if piece]
     if not names:
@@ -127,7 +127,7 @@ def check_filter(name: str) -> None:
 
 
 def is_shield(name: str) -> bool:
-    """Whether a filter is the shield, with whatever settings."""
+    """Return whether a filter is the shield, with any settings."""
     return name.partition(":")[0] == SHIELD
 
 
@@ -135,7 +135,7 @@ def split_name(name: str) -> tuple[str, dict[str, Any]]:
     """Split ``shield:KEY=VALUE,...`` into the name and the settings; values are JSON or words.
 
     Raises:
-        ConfigError: a setting without a value, or one that the conditions decide.
+        ConfigError: a setting without a value, or one that follows from the conditions.
     """
     base, _, rest = name.partition(":")
     settings: dict[str, Any] = {}
@@ -153,7 +153,7 @@ def split_name(name: str) -> tuple[str, dict[str, Any]]:
 
 
 def build_filter(guard: str | FilterMaker, scenes: Scenes, conditions: Conditions) -> SafetyFilter:
-    """Make the filter of a name, or by what makes one, for a batch of scenes; the conditions become settings.
+    """Build the filter with a name, or call a maker, for a batch of scenes; conditions become settings.
 
     Raises:
         ConfigError: an unknown name, or a filter that cannot honour the conditions.

@@ -1,27 +1,27 @@
-"""Filters that try manoeuvres out on the boat's own model: what they share, and gatekeeper. Compiled.
+"""Filters that simulate manoeuvres on the boat's own model: shared code, and gatekeeper. Compiled.
 
-A plan of a boat is one row: steps left of its first command, speed m/s and heading deg of that command, speed and
-heading of the command after it. Headings are absolute, so that a plan means the same trajectory one step on.
+A boat's plan is one row: steps left of its first command, speed m/s and heading deg of that command, speed and
+heading of the command after it. Headings are absolute, so a plan means the same trajectory one step later.
 
-gatekeeper: the nominal command for as long as possible, then a backup that is known to be safe. Source: Agrawal, Chen,
+gatekeeper follows the nominal command as long as possible, then a backup known to be safe. Source: Agrawal, Chen,
 Panagou, "gatekeeper: Online Safety Verification and Control for Nonlinear Systems in Dynamic Environments" (T-RO 2024,
 arXiv 2211.14361), and the search over switching times of several agents of arXiv 2604.02401. In their words: a
-*candidate* trajectory follows the nominal one for T_S and the backup controller for T_B after it; it is *valid* when it
-stays in the safe set all the way and ends in the backup set; the valid one with the greatest T_S is *committed*, and
-where there is none the committed one goes on. An agent holds the others' committed trajectories for what they will do,
-and plans while they do not.
+*candidate* trajectory follows the nominal one for T_S and the backup controller for T_B after it. It is *valid* if it
+stays in the safe set all the way and ends in the backup set. The valid one with the greatest T_S is *committed*; if
+there is none, the committed one continues. An agent assumes that the others follow their committed trajectories, and
+plans while they do not.
 
-What the papers leave to the user, and what stands here:
+The papers leave these choices to the user:
 
-| left open | here |
+| left open | choice here |
 | --- | --- |
-| nominal trajectory | the nominal command held, speed and absolute heading: a filter is not told a policy's plans |
+| nominal trajectory | the nominal command held, speed and absolute heading: a filter does not know a policy's plans |
 | backup controller | the manoeuvre of the library with the greatest least clearance |
-| model | the boat's hull and autopilot, step by step: what is committed is what the boat does |
-| backup set | nobody comes within the radius, ever, if from the end on every boat holds its course |
-| others | opponents hold course and speed; or fill the disc they can reach (then the backup set is not asked for) |
-| the first committed trajectory | to stop on the present heading |
-| who plans when | teammates one after the other within a step, in the order of their numbers |
+| model | the boat's hull and autopilot, step by step: the boat does what is committed |
+| backup set | no boat ever comes within the radius if, from the end on, every boat holds its course |
+| others | opponents hold course and speed; or fill the disc they can reach (then the backup set is not required) |
+| the first committed trajectory | stop on the present heading |
+| planning order | teammates one after the other within a step, by number |
 """
 
 from __future__ import annotations
@@ -45,11 +45,11 @@ from .unicycle import input_limits
 TURNS_DEG = (30.0, 60.0, 90.0, 130.0, 170.0)
 """Turns of the library, to port and to starboard at top speed, deg from the present heading."""
 HOLD_SPEED = -1.0
-"""Speed share that stands for the present speed."""
+"""Speed share that means the present speed."""
 LIBRARY = np.array([(0.0, HOLD_SPEED), *((side * turn, 1.0) for turn in TURNS_DEG for side in (-1.0, 1.0)), (0.0, 0.0)])
 """(M, 2) turn deg and share of top speed of each manoeuvre: hold, turns to either side, stop."""
 SWITCH_SHARES = (1.0, 0.5, 0.25, 0.125)
-"""Switching times that are tried, as shares of the longest; then one step, then none."""
+"""Candidate switching times as shares of the longest; one step and none follow."""
 MOST = {"horizon_s": 60.0, "switch_s": 30.0, "alpha_per_s": 10.0}
 N_PLAN = 5
 NO_PLAN = -1.0
@@ -60,8 +60,8 @@ PASSED, BACKUP, GOES_ON = 0, 1, 2
 class Setup(NamedTuple):
     """Constants of a fleet of n boats.
 
-    ``params`` (n, N_PARAM), ``limits`` (n, 3) of `unicycle`, ``team`` (n,), ``library`` (M, 2), ``switches``
-    in steps, ``steps`` of the horizon, ``worst``: opponents fill the disc they can reach, else they hold course.
+    ``params`` (n, N_PARAM), ``limits`` (n, 3) of `unicycle`, ``team`` (n,), ``library`` (M, 2); ``switches`` and
+    ``steps`` (horizon) in steps; ``worst``: opponents fill the disc they can reach, else they hold course.
     """
 
     params: Array
@@ -77,7 +77,7 @@ class Setup(NamedTuple):
 
 
 class Around(NamedTuple):
-    """The other boats: who is ``near`` (n,), everybody's ``path`` (n, K, 2), and how discs ``grow`` (n,), m/s."""
+    """The other boats: ``near`` (n,) marks those in reach; ``path`` (n, K, 2) of all; discs ``grow`` (n,) by m/s."""
 
     near: BoolArray
     path: Array
@@ -86,13 +86,13 @@ class Around(NamedTuple):
 
 @kernel
 def advance(setup: Setup, i: int, row: Array, speed_mps: float, heading_deg: float) -> None:
-    """One step of boat i under an absolute command, by hull and autopilot model, in place."""
+    """Advance boat i by one step under an absolute command, with hull and autopilot model, in place."""
     step_boat(setup.params[i], row, speed_mps, wrap_degrees(heading_deg - row[L.HEADING]), setup.dt_s)
 
 
 @kernel
 def command_of(setup: Setup, i: int, m: int, state: Array) -> tuple[float, float]:
-    """Speed, m/s, and absolute heading, deg, of manoeuvre m begun now."""
+    """Return speed, m/s, and absolute heading, deg, of manoeuvre m begun in ``state``."""
     share = setup.library[m, 1]
     speed = state[L.SPEED] if share == HOLD_SPEED else share * setup.limits[i, 0]
     return speed, wrap_degrees(state[L.HEADING] + setup.library[m, 0])
@@ -100,7 +100,7 @@ def command_of(setup: Setup, i: int, m: int, state: Array) -> tuple[float, float
 
 @kernel
 def roll_plan(setup: Setup, j: int, state: Array, plan: Array, path: Array) -> None:
-    """Write the places (K, 2) of boat j under its plan; a boat without one holds course."""
+    """Write the positions (K, 2) of boat j under its plan; a boat without a plan holds course."""
     row = state.copy()
     path[0, 0], path[0, 1] = row[L.X], row[L.Y]
     for k in range(1, path.shape[0]):
@@ -113,9 +113,9 @@ def roll_plan(setup: Setup, j: int, state: Array, plan: Array, path: Array) -> N
 
 @kernel
 def predict_all(setup: Setup, state: Array, ours: BoolArray, plan: Array, path: Array, grow: Array) -> None:
-    """Places (n, K, 2) of all boats and growth (n,), m/s, of the discs around them.
+    """Write positions (n, K, 2) of all boats and growth (n,), m/s, of the discs around them.
 
-    An opponent is on its course, or at the centre of the disc it can reach.
+    An opponent holds its course; with ``worst`` it is at the centre of the disc it can reach.
     """
     for j in range(state.shape[0]):
         grow[j] = 0.0
@@ -132,7 +132,7 @@ def predict_all(setup: Setup, state: Array, ours: BoolArray, plan: Array, path: 
 
 @kernel
 def mark_near(setup: Setup, i: int, state: Array, steps: int, near: BoolArray) -> bool:
-    """Mark (n,) whom boat i could touch within so many steps, both at top speed; whether there is anybody."""
+    """Mark (n,) boats that boat i could touch within ``steps``, both at top speed; return whether there is any."""
     found = False
     for j in range(state.shape[0]):
         gap = math.hypot(state[j, L.X] - state[i, L.X], state[j, L.Y] - state[i, L.Y]) - setup.radius_m
@@ -144,7 +144,7 @@ def mark_near(setup: Setup, i: int, state: Array, steps: int, near: BoolArray) -
 
 @kernel
 def gap_at(setup: Setup, around: Around, k: int, x: float, y: float) -> float:
-    """Least clearance of a place at step k from all who are near, m; 0 is the radius to keep."""
+    """Return the least clearance of a position at step k from all near boats, m; 0 is exactly the radius."""
     path, least = around.path, math.inf
     for j in range(path.shape[0]):
         if around.near[j]:
@@ -155,7 +155,7 @@ def gap_at(setup: Setup, around: Around, k: int, x: float, y: float) -> float:
 
 @kernel
 def gap_after(setup: Setup, around: Around, k: int, row: Array) -> float:
-    """Least clearance for ever after step k if every boat then holds its course, m."""
+    """Return the least clearance for ever after step k if every boat then holds its course, m."""
     near, path, course = around.near, around.path, math.radians(row[L.HEADING])
     least = math.inf
     for j in range(near.shape[0]):
@@ -171,13 +171,13 @@ def gap_after(setup: Setup, around: Around, k: int, row: Array) -> float:
 
 
 class RolloutFilter(BatchFilter):
-    """Commands of B games of the same fleet, filtered by manoeuvres that are rolled out.
+    """Filter of commands of B games of the same fleet by rolled-out manoeuvres; see `BatchFilter`.
 
-    Reasons: 0 passed bit for bit, 1 changed (gatekeeper: the backup begins now), 2 gatekeeper: no candidate is valid
-    and the committed trajectory goes on; PL-CBF: its program has no answer and the boat follows the mode taken.
-    ``safety_margin_m`` is the least clearance of what is committed, or the value of the mode taken, m; inf where nobody
-    is within reach. Fixed things and the field's edge are not kept clear of. What is not said here is as in
-    `BatchFilter`; ``settings`` are the filter's own, by key.
+    Reasons: 0 passed bit for bit; 1 changed (gatekeeper: the backup begins now); 2 gatekeeper: no candidate is valid
+    and the committed trajectory continues; PL-CBF: the program has no usable answer and the boat follows the chosen
+    mode. ``safety_margin_m`` is the least clearance of the committed trajectory, or the value of the chosen mode, m;
+    inf if no boat is within reach. The filters do not avoid static obstacles or the field's edge. ``settings`` are the
+    filter's own, by key.
     """
 
     columns, forgotten = N_PLAN, NO_PLAN
@@ -212,7 +212,7 @@ class RolloutFilter(BatchFilter):
 
     @classmethod
     def read_settings(cls, name: str, given: Mapping[str, Any], dt_s: float = 0.1) -> dict[str, Any]:
-        """Settings of what was given with a filter's name; no time may be shorter than a step.
+        """Return all settings of a filter from those given with its name; no time may be shorter than a step.
 
         Raises:
             ConfigError: an unknown key, or a value out of bounds.
@@ -230,7 +230,7 @@ class RolloutFilter(BatchFilter):
 
 @kernel
 def backup_value(setup: Setup, i: int, start: Array, k: int, m: int, around: Around, floor_m: float) -> float:
-    """Least clearance, m, of manoeuvre m begun at step k in the state ``start``; -inf once it is below ``floor_m``."""
+    """Return the least clearance, m, of manoeuvre m begun at step k in state ``start``; -inf once below ``floor_m``."""
     speed, heading = command_of(setup, i, m, start)
     row, least = start.copy(), math.inf
     for t in range(1, setup.steps + 1):
@@ -245,7 +245,7 @@ def backup_value(setup: Setup, i: int, start: Array, k: int, m: int, around: Aro
 
 @kernel
 def _decide_boat(setup: Setup, i: int, state: Array, around: Around, plan: Array, filtered: Array) -> tuple[int, float]:
-    """Commit to the valid candidate that switches last, or go on; returns why, and the least clearance of that, m."""
+    """Commit to the valid candidate that switches last, or continue; return the reason and the least clearance, m."""
     speed, heading = filtered[0], wrap_degrees(state[L.HEADING] + filtered[1])
     trail, least_m = np.empty((setup.switches[0] + 1, L.N_STATE)), np.empty(setup.switches[0] + 1)
     trail[0], least_m[0] = state, gap_at(setup, around, 0, state[L.X], state[L.Y])
@@ -274,7 +274,7 @@ def _decide_boat(setup: Setup, i: int, state: Array, around: Around, plan: Array
 
 @kernel
 def decide_game(setup: Setup, game: Games) -> None:
-    """Decide for the boats of ours, one after the other; ``filtered`` starts as the nominal commands."""
+    """Decide for the own boats, one after the other; ``filtered`` starts as the nominal commands."""
     state, _, ours, plan, filtered, reason, clear_m = game
     n, steps = state.shape[0], setup.switches[0] + setup.steps
     path, grow, near = np.empty((n, steps + 1, 2)), np.empty(n), np.empty(n, np.bool_)
@@ -297,13 +297,13 @@ def decide_game(setup: Setup, game: Games) -> None:
 
 @kernel
 def decide_games(setup: Setup, games: Games) -> None:
-    """`decide_game` for every game; the memory is the boats' plans."""
+    """Run `decide_game` for every game; the memory holds the boats' plans."""
     for b in range(len(games.state)):
         decide_game(setup, game_of(games, b))
 
 
 class Gatekeeper(RolloutFilter):
-    """gatekeeper; ``gatekeeper-worst`` takes opponents to fill the disc they can reach at top speed.
+    """gatekeeper; in ``gatekeeper-worst`` opponents fill the disc they can reach at top speed.
 
     Settings: ``horizon_s``, length of the backup (T_B of the paper), and ``switch_s``, longest switching time (T_H).
     """

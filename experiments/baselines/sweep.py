@@ -1,8 +1,9 @@
-"""The sweep that chose the gains, on two-boat families of the encounter suite: ``python -m`` this module runs it again.
+"""Gain sweep on two-boat families of the encounter suite; ``python -m`` this module repeats it.
 
-It takes the gains with the fewest encounters breached at a separation of 2.5 m over all families, among these the
-fewest commands changed, among these the first. That is in the filters' favour: a grid of up to 109 candidates, tried
-on the boats and the kinds of encounter they are then compared on (with other seeds). Minutes on one core.
+For each barrier it selects the gains with the fewest encounters with a violation at a separation of 2.5 m over all
+families. Ties are broken by the fewest changed commands, then by order. This favours the filters: up to 109 candidates
+are tried on the boats and kinds of encounter on which the filters are later compared (with other seeds). The sweep
+takes minutes on one core.
 """
 
 import logging
@@ -17,7 +18,7 @@ FAMILIES = ("head_on", "crossing_left", "crossing_right", "rammer_1")
 
 
 def cost(name: str, platform: str, gains: Gains, n: int = 60, seed: int = 20_260) -> tuple[int, float]:
-    """Encounters breached, then commands changed: smaller is better."""
+    """Return encounters with a violation, then the sum of changed commands, percent; smaller is better."""
 
     def make(config: Any, games: int, platforms: Any, team: Any, _: Any) -> TextbookFilter:
         return TextbookFilter(name, config, games, platforms, team, gains)
@@ -27,7 +28,7 @@ def cost(name: str, platform: str, gains: Gains, n: int = 60, seed: int = 20_260
 
 
 def best(name: str, platform: str) -> Gains:
-    """The winner among the gains that are tried."""
+    """Return the best of the candidate gains."""
     return min(BARRIERS[name].tried, key=lambda gains: cost(name, platform, gains))
 
 

@@ -1,11 +1,12 @@
-"""`TextbookFilter`: a barrier of the literature in the place where the shield stands, and the loop that all share.
+"""`TextbookFilter`: a barrier of the literature with the batched shield's interface, and the loop that barriers share.
 
-Every boat of ours has two inputs z: its velocity (east, north, m/s), or those of `unicycle`. Others keep theirs; two
-boats of ours both answer their row. With B z what inputs do to velocities, a pair's row dh/dt >= -alpha h reads
+Every own boat has two inputs z: its velocity (east, north, m/s), or those of `unicycle`. Other boats keep their
+velocity; two own boats share the constraint of their pair. With B z the effect of inputs on velocities, a pair's
+constraint dh/dt >= -alpha h reads
 
     <dh/dp, v> + <dh/dv, B_j z_j - B_i z_i> >= -alpha h
 
-and of velocities as inputs, with v_j of a boat that is not ours, <dh/dp, z_j or v_j> - <dh/dp, z_i> >= -alpha h.
+With velocities as inputs, and v_j of a boat that is not own, it reads <dh/dp, z_j or v_j> - <dh/dp, z_i> >= -alpha h.
 """
 
 from __future__ import annotations
@@ -29,13 +30,13 @@ from .unicycle import SOLVED, UNSOLVED, command_of_inputs, holds, input_limits, 
 __all__ = ["BARRIERS", "NAMES", "Barrier", "TextbookFilter"]
 NAMES = tuple(BARRIERS)
 FACETS = 16
-"""Sides of the polygon within the disc of speeds; one corner lies in the nominal direction."""
+"""Sides of the polygon inscribed in the disc of speeds; one corner lies in the nominal direction."""
 SAME = 1e-9
-"""Inputs this near to the nominal ones are the nominal ones."""
+"""Inputs this near to the nominal ones count as equal."""
 
 
 class Setup(NamedTuple):
-    """Whether velocities are the inputs, step, s, platform rows (n, N_PARAM) and `InputLimits` (n, 3) of n boats."""
+    """Whether inputs are velocities; step, s; platform rows (n, N_PARAM) and `InputLimits` (n, 3) of n boats."""
 
     of_velocity: bool
     dt_s: float
@@ -44,12 +45,12 @@ class Setup(NamedTuple):
 
 
 class TextbookFilter(BatchFilter):
-    """Commands filtered as the literature does; what is not said here is as in `BatchFilter`.
+    """Filter of commands by a barrier of the literature; see `BatchFilter`.
 
-    Reasons: 0 passed bit for bit, 1 changed, 2 the program had no answer and was relaxed (the command may then be
-    the nominal one, where no input helps), 3 not even the relaxed program was solved: the boat is told to stop.
-    ``safety_margin_m`` is the distance to the nearest boat less the radius kept, m. ``gains`` are for all boats; None
-    takes those of each platform.
+    Reasons: 0 passed bit for bit; 1 changed; 2 the program was infeasible and relaxed (the command may still be the
+    nominal one, where no input helps); 3 the relaxed program was not solved either, and the filter stops the boat.
+    ``safety_margin_m`` is the distance to the nearest boat less the required radius, m. ``gains`` apply to all boats;
+    None: those of each platform.
     """
 
     def __init__(
@@ -91,13 +92,13 @@ class TextbookFilter(BatchFilter):
 
 
 def _between(of: Array) -> Array:
-    """What boat j has more than boat i, (2, B, n, n)."""
+    """Return the difference of boat j to boat i, (2, B, n, n)."""
     return of[:, :, None, :] - of[:, :, :, None]
 
 
 @kernel
 def headings(state: Array) -> Array:
-    """Unit vectors (2, B, n) of the boats' headings."""
+    """Return unit vectors (2, B, n) of the boats' headings."""
     e = np.empty((2, *state.shape[:2]))
     for b, i in np.ndindex(state.shape[:2]):
         course = math.radians(state[b, i, L.HEADING])
@@ -111,10 +112,10 @@ def _inputs(
 ) -> float:
     """Write boat i's nominal inputs z (2,), B (2, 4), least and greatest z (2, 2), and limits C z >= d.
 
-    What an input does to the velocity is B[:2] times B[2] times B[3].
+    An input's effect on the velocity is B[:2] times B[2] times B[3].
 
     Returns:
-        The largest turn rate of this step, rad/s.
+        The largest turn rate of this step, rad/s; 0 for velocities as inputs.
     """
     top, ahead, B[:] = setup.limits[i, 0], math.radians(state[L.HEADING]), 1.0
     if setup.of_velocity:
@@ -135,7 +136,7 @@ def _inputs(
 
 @kernel
 def _command(setup: Setup, i: int, state: Array, nominal: Array, z: Array, most_radps: float) -> tuple[float, float]:
-    """Speed and relative heading of boat i that yield its inputs z (2,)."""
+    """Return speed and relative heading of boat i that yield its inputs z (2,)."""
     if not setup.of_velocity:
         return command_of_inputs(setup.params[i], setup.limits[i], state, z, most_radps, setup.dt_s)
     speed = math.hypot(z[0], z[1])
@@ -146,7 +147,7 @@ def _command(setup: Setup, i: int, state: Array, nominal: Array, z: Array, most_
 
 @kernel
 def _pair_rows(ours: BoolArray, acts: Array, need: Array, B: Array, box: Array, C: Array, d: Array) -> IntArray:
-    """Write the rows that some inputs could break, of unit length unless none has an effect; their pairs (rows, 2)."""
+    """Write rows that inputs could violate, of unit length unless no input matters; return their pairs (rows, 2)."""
     pairs, r = np.zeros((len(d), 2), np.int64), 0
     for i, j in np.ndindex(need.shape):
         if i == j or not ours[i] or (ours[j] and j < i):
@@ -161,14 +162,14 @@ def _pair_rows(ours: BoolArray, acts: Array, need: Array, B: Array, box: Array, 
             row[:], length = 0.0, 1.0
         row /= length
         d[r] = need[i, j] / length
-        if not np.minimum(row * box[:, 0], row * box[:, 1]).sum() >= d[r]:  # one of NaN counts
+        if not np.minimum(row * box[:, 0], row * box[:, 1]).sum() >= d[r]:  # a NaN row counts
             pairs[r, 0], pairs[r, 1], r = i, j, r + 1
     return pairs[:r]
 
 
 @kernel
 def decide_game(setup: Setup, game: Games, acts: Array, need: Array) -> None:
-    """Decide for the boats of ours in one game, (n, ...) each."""
+    """Decide for the own boats in one game, arrays (n, ...)."""
     state, nominal, ours, own = game.state, game.nominal, game.ours, np.flatnonzero(game.ours)
     n, sides = len(ours), FACETS if setup.of_velocity else 4
     z0, most, hard = np.zeros(2 * n), np.zeros(n), sides * len(own)
@@ -197,7 +198,7 @@ def decide_game(setup: Setup, game: Games, acts: Array, need: Array) -> None:
 
 @kernel
 def decide_games(setup: Setup, games: Games, acts: Array, need: Array) -> None:
-    """`decide_game` for every game; arrays carry a leading games axis."""
+    """Run `decide_game` for every game; arrays carry a leading games axis."""
     for b in range(len(games.state)):
         decide_game(setup, game_of(games, b), acts[b], need[b])
 

@@ -1,12 +1,13 @@
-"""A boat as the literature's filters see it, a unicycle that accelerates and turns by two inputs z, and their program.
+"""Unicycle model of a boat for the literature's filters, with two inputs z (acceleration, turn), and its program.
 
-Between it and the boat stands an autopilot, which takes a speed and a heading. Turns go through its inverse, as the
+An autopilot between filter and boat takes a speed and a heading. Turns go through the autopilot's inverse, as the
 shield's do, so that a filter has the boat's full rudder. z are shares of the boat's braking and of its largest turn
-now; a share z of braking is commanded as the speed v + z top speed, which spans the speed commands. The program is
+in this step. A share z of braking is commanded as the speed v + z top speed, which spans the speed commands. The
+program is
 
     minimise |z - z0|^2 + w sum e_r^2   subject to   c_r z + e_r >= d_r,   limits
 
-with the usual relaxation: slacks e_r of barriers' rows are 0 unless no z meets all rows; limits are hard.
+with the usual relaxation: slacks e_r of barrier constraints are 0 unless no z satisfies all of them; limits are hard.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ SLACK_WEIGHT = 1e6
 
 
 class InputLimits(NamedTuple):
-    """Top speed, m/s; mean acceleration from rest to 90 % of it, and braking that stops in the boat's way, m/s^2."""
+    """Top speed, m/s; mean acceleration from rest to 90 % of it; braking for the boat's stopping distance, m/s^2."""
 
     top_speed_mps: float
     gain_mps2: float
@@ -40,7 +41,7 @@ class InputLimits(NamedTuple):
 
 @lru_cache(maxsize=64)
 def input_limits(platform: Platform, dt_s: float) -> InputLimits:
-    """Limits of a platform, by running its own model with step ``dt_s``, s."""
+    """Return limits of a platform, from rollouts of its model with step ``dt_s``, s."""
     top, steps = platform.max_speed_mps, 0
     (params, state), start = cruise(platform, dt_s), fresh_state(0.0, 0.0, 0.0)
     for _ in range(int(LONGEST_S / dt_s)):
@@ -58,10 +59,10 @@ def input_limits(platform: Platform, dt_s: float) -> InputLimits:
 def inputs_of_command(
     params: Array, limits: Array, state: Array, command: Array, dt_s: float, z: Array, box: Array
 ) -> float:
-    """Write what a command amounts to, z (2,), and the least and greatest of both inputs (2, 2).
+    """Write the inputs z (2,) equivalent to a command, and the least and greatest of both inputs (2, 2).
 
-    A boat neither reverses nor tops its top speed in this step. The turn is that of the boat's own model in it, so that
-    an obeyed command is a fixed point.
+    A boat neither reverses nor exceeds its top speed in this step. The turn is that of the boat's own model in this
+    step, so a command that is obeyed is a fixed point.
 
     Returns:
         The largest turn rate of this step, rad/s, of which the second input is a share.
@@ -83,14 +84,14 @@ def inputs_of_command(
 def command_of_inputs(
     params: Array, limits: Array, state: Array, z: Array, most_radps: float, dt_s: float
 ) -> tuple[float, float]:
-    """Speed, m/s, and relative heading, deg, that make the autopilot yield the inputs, or the nearest to them."""
+    """Return speed, m/s, and relative heading, deg, that make the autopilot yield the inputs, or the nearest."""
     speed = clamp(state[L.SPEED] + z[0] * limits[2] * limits[0] / limits[2], 0.0, limits[0])
     return speed, command_for_turn(params, state, speed, math.degrees(z[1] * most_radps) * dt_s, dt_s)
 
 
 @kernel
 def holds(C: Array, d: Array, z: Array, tolerance: float) -> bool:
-    """Whether every row of C z >= d - tolerance holds; written so that NaN fails."""
+    """Return whether every row satisfies C z >= d - tolerance; NaN fails."""
     for r in range(len(d)):
         total = 0.0
         for c in range(len(z)):
@@ -102,9 +103,9 @@ def holds(C: Array, d: Array, z: Array, tolerance: float) -> bool:
 
 @kernel
 def solve(C: Array, d: Array, hard: int, z0: Array, z: Array, slack: Array) -> int:
-    """Write the ``z`` nearest to ``z0`` (n,) that meets C z >= d (rows, n) of unit length, the first ``hard`` limits.
+    """Write the ``z`` nearest to ``z0`` (n,) with C z >= d (rows, n), of unit length; the first ``hard`` are limits.
 
-    Where the status is `RELAXED` it does with ``slack`` (rows - hard,); where it is `UNSOLVED` it is ``z0``.
+    With status `RELAXED`, ``z`` satisfies the rows with ``slack`` (rows - hard,); with `UNSOLVED`, ``z`` is ``z0``.
     """
     (rows, n), unit = C.shape, 1.0 / math.sqrt(SLACK_WEIGHT)
     slack[:] = 0.0
