@@ -86,7 +86,7 @@ def linearised(random, name, team, gap_m, tries, surroundings=None):
         at = stages_of(config, meeting(random, name, gap_m * random.uniform(0.6, 1.2)), [name] * 2, team, surroundings)
         top = get_platform(name).max_speed_mps
         wanted = np.column_stack([random.uniform(0.3, 0.95, 2) * top, random.uniform(-2.0, 2.0, 2)])
-        if screened(at, wanted) or at.breach.any():
+        if screened(at, wanted) or at.inside_separation.any():
             continue
         count, found = built(at)
         if found > 4 * count:
