@@ -1,6 +1,6 @@
-"""`CommandPipeline`: the one way commands leave: nominal, checked, shielded, sent. Nothing changes them after that.
+"""`CommandPipeline`: the only path of commands to boats. Nothing changes a command after the shield.
 
-What the shield itself asks to be stopped (`Reason.STOPPED`) is stopped by the link, past the command.
+Where the shield demands a stop (`Reason.STOPPED`), the link stops the boat itself and sends no command.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ from .tracker import Tracker
 
 LOG = logging.getLogger(__name__)
 
-TALK_EVERY_S = 5.0  # the same failure of the decision is logged again after this long, s
+TALK_EVERY_S = 5.0  # interval between logs of the same failure of the decision, s
 
 
 @dataclass(frozen=True)
 class Steered:
-    """What went in and out of one decision, see `messages.Tick`; and boats found beyond the hard line."""
+    """Inputs and outputs of one decision, see `messages.Tick`; ``beyond``: boats beyond the hard line."""
 
     fleet: Fleet | None = None
     wanted: Commands | None = None
@@ -47,7 +47,7 @@ class Steered:
 
 
 class CommandPipeline:
-    """Takes what boats should do to the one shield, and its answer to the links of the boats this process commands."""
+    """Path from nominal commands through the shield to the links of the boats that this process commands."""
 
     def __init__(self, fleet: FleetFile, shield: Shield, links: Mapping[str, Link], clock: Clock) -> None:
         self._file, self._shield, self._links, self._clock = fleet, shield, links, clock
@@ -69,11 +69,11 @@ class CommandPipeline:
         """Decide and send for all boats of this process.
 
         Args:
-            tracker: what is known of all boats.
-            answer: the policy's absolute commands, all boats of the file; used for boats without a response due.
-            verdict: responses due, boats whose state is unknown, boats that do not obey.
-            surroundings: static constraints now.
-            mates: teammates another process commands behind a shield of their own.
+            tracker: tracks of all boats.
+            answer: the policy's absolute commands for all boats of the file; used for boats without a response due.
+            verdict: responses due, boats in unknown state, boats that do not obey.
+            surroundings: current static constraints.
+            mates: teammates that other processes command, with their own shields.
         """
         commanded = [name for name in self._links if name not in verdict.unknown and name not in verdict.idle]
         so_far = Steered()
@@ -85,10 +85,10 @@ class CommandPipeline:
             nominal = self._nominal(fleet, commanded, answer, verdict)
             so_far = Steered(fleet, nominal, surroundings)
             reset, self._fresh = self._fresh, False
-            if reset:  # at the start and after a failure: half-made memory is not to be trusted
+            if reset:  # at the start and after a failure, which may leave inconsistent memory
                 self._shield.reset()
             decisions = self._shield.decide(fleet, nominal, surroundings)
-        except Exception as error:  # whatever broke, no boat may go on with an old command
+        except Exception as error:  # after any failure, no boat may continue with an old command
             return self._finish(self._failed(so_far, commanded, error), verdict)
         actions: list[Action] = []
         sent = {name: self._send(name, decisions, actions) for name in commanded}
@@ -97,7 +97,7 @@ class CommandPipeline:
         return self._finish(steered, verdict)
 
     def stop_all(self, names: Collection[str]) -> dict[str, Sent]:
-        """Tell boats to stop by their links' surest way, past the shield."""
+        """Stop boats by their links' most reliable way, bypassing the shield."""
         return {name: self._links[name].stop() for name in names}
 
     def _nominal(self, fleet: Fleet, commanded: Collection[str], answer: Commands | None, verdict: Verdict) -> Commands:
@@ -111,7 +111,7 @@ class CommandPipeline:
                 else:
                     response = "stop" if response == "go_on" else response
                     values[i] = self._responders[name].wanted(response, fleet.state[i])
-            elif fleet.controlled[i]:  # a teammate with its own shield: taken to hold its course
+            elif fleet.controlled[i]:  # a teammate with its own shield: assumed to hold its course
                 values[i] = max(0.0, fleet.state[i, L.SPEED]), math.radians(fleet.state[i, L.HEADING]) % TWO_PI
         return Commands.absolute_rad(values)
 
@@ -135,7 +135,7 @@ class CommandPipeline:
             return self._links[name].stop()
 
     def _outside_m(self, fleet: Fleet, i: int) -> float:
-        """How far outside a boat is, now or once a command works, for which the shield decides, m."""
+        """Return how far outside the area a boat is, m: the larger of the present and when a command takes effect."""
         (x, y), heading, way = fleet.position_m[i], fleet.heading_rad[i], fleet.state[i, L.SPEED] * self._delay_s
         left, low, right, high = self._file.geofence.box
         places = ((x, y), (x + way * math.sin(heading), y + way * math.cos(heading)))
@@ -152,7 +152,7 @@ class CommandPipeline:
         return replace(so_far, sent=self.stop_all(commanded), actions=(action,))
 
     def _finish(self, steered: Steered, verdict: Verdict) -> Steered:
-        """Stop boats whose state is unknown; leave alone those that somebody else steers."""
+        """Stop boats without a command; send nothing to those that do not obey."""
         sent = dict(steered.sent)
         for name in self._links:
             if name not in sent and name in verdict.idle:

@@ -1,8 +1,8 @@
-"""Own boats: what the autopilot remembers is followed by running the boat's model on the commands sent.
+"""State estimation of own boats, including the memory of their autopilots' controllers.
 
-Telemetry says where a boat is, never what its controllers remember, and what they remember decides what the next
-command does. The model is stepped through the commands in effect and corrected by telemetry, measurement by
-measurement at the time each was true. As long as telemetry agrees with the model the row is the model's, bit for bit.
+Telemetry does not contain the controllers' memory, on which the effect of the next command depends. The estimator steps
+the boat's model through the commands in effect. It corrects the model by each measurement at the time it was taken.
+While telemetry agrees with the model, the state is the model's, bit for bit.
 """
 
 from __future__ import annotations
@@ -19,44 +19,45 @@ from ..platforms import layout as L
 from ..tracks import thrust_at, whole_steps
 from .messages import BoatReading
 
-GAIN = 0.5  # share of a difference that is corrected at once: a filter of about 0.15 s at 10 Hz
+GAIN = 0.5  # share of a difference corrected per reading: a time constant of about 0.15 s at 10 Hz
 ROUNDING = np.array([0.01, 0.01, 0.02, 0.01])
-"""Differences below this (m, m, deg, m/s) are what messages round off, and are left alone."""
+"""Differences up to this (m, m, deg, m/s) are rounding of the messages and are not corrected."""
 SURPRISE = np.array([1.5, 1.5, 25.0, 0.6])
-"""Differences beyond this (m, m, deg, m/s) say that the boat did not obey the model: it starts afresh there."""
-BOAT_TIMEOUT_S = 3.0  # a boat that hears nothing goes on with its last command for this long, then stops
+"""Beyond these differences (m, m, deg, m/s) the boat did not follow the model: the estimate restarts at the reading."""
+BOAT_TIMEOUT_S = 3.0  # without new commands a boat continues its last one for this long, then stops
 SPENT_S = 1.0
-"""A command not repeated for this long says nothing any more: somebody else steers, and the boat goes straight on."""
+"""A command not repeated for this long no longer counts: another steers, and the boat is taken to go straight on."""
 LONGEST_GAP_STEPS = 50
-"""Steps run at once at most, after a standstill of the loop; beyond it the row waits for telemetry."""
+"""Most steps taken at once, after the loop stood still; beyond that the state waits for telemetry."""
 GONE_M, LEFT_M, STILL_MPS = 0.3, 0.05, 0.1
-"""A source that repeats itself to the last digit while the model goes the first is frozen, since it left by the second.
-Slower than the third a boat lies still."""
+"""A source that repeats its values exactly while the model moves by the first is frozen, m.
+
+It counts as frozen from when the model had moved by the second, m. Slower than the third, m/s, a boat is at rest."""
 MOST_UNSEEN_M = 2.0
-"""A boat found at rest again after it may have gone unseen is believed anew until that way is longer than this, m."""
+"""A boat at rest after possible unseen motion is trusted again only up to this length of that motion, m."""
 RATE_AGE_S, RATE_ROUNDING_DPS, RATE_GAIN = 0.15, 2.0, 0.3
-"""Turn rates told are taken when no older, s; smaller differences, deg/s, are left alone; of larger ones this share."""
+"""Largest age of a turn rate used, s; differences up to the second, deg/s, are ignored; gain for larger ones."""
 _SEEN = [L.X, L.Y, L.HEADING, L.SPEED]
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A boat of ours now."""
+    """Estimated state of an own boat."""
 
     row: Array  # (N_STATE,) state and autopilot memory
-    age_s: float  # since the oldest of what it rests on was measured, s
-    spread_m: float  # half the distance between where it is if it heard the last commands and if it did not, m
+    age_s: float  # age of the oldest measurement used, s
+    spread_m: float  # half the distance between its positions with and without the last commands received, m
 
 
 class Estimator:
-    """Follows one boat, in steps of ``dt_s`` of the loop and the model.
+    """State estimator of one boat, in steps of ``dt_s``.
 
-    The delay from sending a command to its effect is counted up to whole steps, as the shield counts it: with less a
-    command would be run here and by the shield once more.
+    The delay from sending a command to its effect is rounded up to whole steps, as in the shield. With a shorter delay
+    the estimator and the shield would both apply the same command.
 
     Attributes:
-        still_since_s: when its source froze, s; inf: it did not.
-        unseen_m: way it may have gone while its source repeated itself, m; counts until something changes.
+        still_since_s: time when the source froze, s; inf if it did not.
+        unseen_m: possible motion while the source repeated its values, m; 0 again once a value changes.
     """
 
     def __init__(self, platform: Platform, dt_s: float, delay_s: float) -> None:
@@ -75,14 +76,14 @@ class Estimator:
         self._past: deque[tuple[float, Array]] = deque(maxlen=32)
 
     def estimate(self, now_s: float) -> Estimate | None:
-        """The boat at the time of the last `advance`; None before the first fix."""
+        """Return the boat at the time of the last `advance`; None before the first fix."""
         if self._row is None or self._deaf is None:
             return None
         apart = self._deaf[: L.Y + 1] - self._row[: L.Y + 1]
         return Estimate(self._row.copy(), now_s - float(self._fixed_s.min()), 0.5 * float(np.hypot(*apart)))
 
     def sent(self, tick_s: float, heading_rad: float, speed_mps: float) -> None:
-        """Note a command that left at the tick of that time; a heading of NaN is the present one."""
+        """Record a command sent at the tick of that time; a heading of NaN means the present heading."""
         if math.isnan(heading_rad):
             if self._row is None:
                 return
@@ -90,7 +91,7 @@ class Estimator:
         self._commands.append((tick_s, speed_mps, heading_rad))
 
     def advance(self, now_s: float) -> None:
-        """Run the model on to ``now_s``, in whole steps."""
+        """Step the model to ``now_s``, in whole steps."""
         if self._row is None or self._deaf is None:
             return
         steps = round((now_s - self._time_s) / self._dt_s)
@@ -105,7 +106,7 @@ class Estimator:
         self._past.append((now_s, self._row[_SEEN]))
 
     def correct(self, reading: BoatReading) -> None:
-        """Take a reading, already found sensible, whose fields are all there."""
+        """Correct the state by a complete reading that passed the plausibility check."""
         fixed_s = _times(reading)
         known = self._row is not None
         difference = self._difference(_measured(reading), fixed_s) if known else np.zeros(len(_SEEN))
@@ -121,15 +122,15 @@ class Estimator:
         self._deaf, self._last_heard = self._row.copy(), self._in_effect(self._time_s)
 
     def stands_still(self, reading: BoatReading) -> bool:
-        """Whether a reading repeats an older one although the boat must have moved since, whatever its time stamps say.
+        """Whether a reading repeats an older one although the boat must have moved since, even with fresh time stamps.
 
-        At rest a boat may say the same to the last digit for ever. Only commands tell that from a source that froze:
-        the model starts where the values were new, is never corrected, and leaves them as the boat would. Told to stop
-        for that, it comes to rest; then the boat lies where the source has it, or no farther off than the model went,
-        and is believed anew with that much more error.
+        A boat at rest may repeat its values exactly for any time. Only the commands tell that from a frozen source: an
+        uncorrected model, started where the values were new, moves away as the boat would. Once that model is at rest
+        under a stop command or none, the boat is taken to be no farther off than the model moved. The source is then
+        trusted again, with that distance added to its error.
         """
         measured, fixed_s = _measured(reading), reading.read_s - reading.age_s
-        if tuple(measured.tolist()) != self._same or not reading.ready:  # who has a boat by hand moves it as he likes
+        if tuple(measured.tolist()) != self._same or not reading.ready:  # not under our command
             self._same, self._new_s, self.unseen_m = tuple(measured.tolist()), fixed_s, 0.0
             self._alone = fresh_state(*measured)
             self._alone[L.THRUST] = thrust_at(self._params, float(measured[3]))
@@ -149,7 +150,7 @@ class Estimator:
         return math.isfinite(self.still_since_s)
 
     def _correct_rate(self, reading: BoatReading) -> None:
-        """Bring the turn rate of a rate-controlled boat, all that its steering remembers, nearer to telemetry."""
+        """Correct the turn rate of a rate-controlled boat, the only memory of its steering, towards telemetry."""
         if self._row is None or not self._turns_by_rate or not reading.turn_rate_age_s <= RATE_AGE_S:
             return
         off = math.degrees(reading.turn_rate_rads) - self._row[L.TURN_RATE]
@@ -157,7 +158,7 @@ class Estimator:
             self._row[L.TURN_RATE] += RATE_GAIN * off
 
     def start(self, reading: BoatReading) -> None:
-        """Begin afresh where the reading says: the boat is taken to hold its course and speed."""
+        """Restart at the reading, assuming steady course and speed."""
         x, y, heading_deg, speed = _measured(reading)
         way, heading = speed * (reading.read_s - float(_times(reading)[0])), math.radians(heading_deg)
         row = fresh_state(x + way * math.sin(heading), y + way * math.cos(heading), heading_deg, speed)
@@ -180,7 +181,7 @@ class Estimator:
         step_boat(self._params, row, command[0], error, self._dt_s)
 
     def _in_effect(self, time_s: float) -> tuple[float, float] | None:
-        """Speed, m/s, and heading, deg, of the command that works in the step after ``time_s``."""
+        """Return speed, m/s, and heading, deg, of the command in effect in the step after ``time_s``."""
         for sent_s, speed, heading in reversed(self._commands):
             if sent_s + self._delay_s <= time_s + 0.5 * self._dt_s:
                 spent = time_s - sent_s - self._delay_s > SPENT_S
@@ -188,14 +189,14 @@ class Estimator:
         return None
 
     def _unheard(self, time_s: float) -> tuple[float, float] | None:
-        """The command in effect if the boat heard nothing since its last fix."""
+        """Return the command in effect if the boat received none since its last fix."""
         silent = time_s - float(self._fixed_s.min())
         if silent <= BOAT_TIMEOUT_S or self._last_heard is None:
             return self._last_heard
         return 0.0, self._last_heard[1]
 
     def _difference(self, measured: Array, fixed_s: Array) -> Array:
-        """Measured less believed, each at the time it was measured."""
+        """Return measured minus estimated values, each at its time of measurement."""
         times, rows = np.array([time for time, _ in self._past]), np.array([row for _, row in self._past])
         rows[:, 2] = np.unwrap(rows[:, 2], period=360.0)
         believed = [np.interp(at_s, times, column) for at_s, column in zip(fixed_s, rows.T, strict=True)]
@@ -204,7 +205,7 @@ class Estimator:
         return difference
 
     def _shift(self, by: Array) -> None:
-        """Correct the row, what led up to it, and the errors the controllers saw: they saw the true ones."""
+        """Correct the state, its history and the controllers' last errors, for which the boat used true values."""
         row = self._row
         if row is None:
             return
@@ -217,12 +218,12 @@ class Estimator:
 
 
 def _measured(reading: BoatReading) -> Array:
-    """X m, y m, heading deg in [-180, 180), speed m/s."""
+    """Return x m, y m, heading deg in [-180, 180), speed m/s."""
     heading_deg = (math.degrees(reading.heading_rad) + 180.0) % 360.0 - 180.0
     return np.array([*reading.position_m, heading_deg, reading.speed_mps])
 
 
 def _times(reading: BoatReading) -> Array:
-    """When each of them was true, s."""
+    """Return the measurement time of each value of `_measured`, s."""
     ages = (reading.position_age_s, reading.position_age_s, reading.heading_age_s, reading.velocity_age_s)
     return reading.read_s - np.array(ages)

@@ -1,4 +1,4 @@
-"""Holds every turn against what is declared in `failsafe_table`, and turns what is due into nominal commands."""
+"""Check of every turn against the limits in `failsafe_table`, and the nominal commands of the responses due."""
 
 from __future__ import annotations
 
@@ -21,59 +21,54 @@ from .operator import Override
 from .tracker import Track, Tracker
 
 STRENGTH = {"none": 0, "go_on": 0, "hold_course": 1, "slow": 2, "hold_station": 3, "return": 4, "stop": 5}
-"""Of several responses due at once the strongest is done."""
+"""Of several responses due at once, the strongest applies."""
 
-RIVAL_S = 2.0  # a second commander counts as there for this long after its last command was noticed, s
-WHOLE_S = 99.0  # ages beyond this are shown in whole seconds
+RIVAL_S = 2.0  # a second commander counts as present for this long after its last command, s
+WHOLE_S = 99.0  # ages from this on are shown in whole seconds
 SPEED_SHARE, SPEED_MORE_MPS, MOST_TURNS_RAD = 1.5, 0.5, 100.0
-"""Speeds beyond this share of the platform's top plus this much, and such headings, are nobody's who knows the boat."""
+"""Commands are unusable beyond this share of the platform's top speed plus this, or beyond this heading."""
 
 STATION_M, STATION_SHARE = 3.0, 0.5
-"""A boat holding station steers back when farther from it than the first, m, at that share of top speed."""
-INSIDE_M = 3.0  # boats return to this far inside the geofence, m
-REST_MPS = 0.2  # a boat slower than this lies still, m/s
+"""A boat farther than this from its station, m, steers back at this share of its top speed."""
+INSIDE_M = 3.0  # distance inside the geofence that boats return to, m
+REST_MPS = 0.2  # slower boats count as at rest, m/s
 
 
 @dataclass(frozen=True)
 class Seen:
-    """What one turn at ``now_s`` is held against, beside what the tracker knows."""
+    """Inputs of the check of one turn, besides the tracker's."""
 
     now_s: float
     readings: Mapping[str, BoatReading]  # of own boats
     answer: Answer  # of the policy
     game_age_s: float = NEVER_S  # age of the state of the game, s; inf: none yet
-    game_expected: bool = False  # whether there is to be a game at all
-    game_over: bool = False  # whether the game has ended
-    log_fault: str = ""  # why ticks can no longer be recorded; empty: they are
+    game_expected: bool = False  # whether a referee is expected
+    game_over: bool = False
+    log_fault: str = ""  # why ticks cannot be recorded; empty if they are
     overrides: tuple[Override, ...] = ()  # in force
-    alarms: tuple[Alarm, ...] = ()  # what is wrong with those who tell where boats are
-    # how long each own boat has been far outside its model, s
-    outside_model_s: Mapping[str, float] = field(default_factory=dict)
-    decided: Decisions | None = None  # the last decisions; None: there were none
+    alarms: tuple[Alarm, ...] = ()  # faults of the sources of positions
+    outside_model_s: Mapping[str, float] = field(default_factory=dict)  # see `ModelErrorMonitor.outside_s`
+    decided: Decisions | None = None  # the last decisions; None if there were none
 
 
 @dataclass
 class Verdict:
-    """What is due now."""
+    """Outcome of the check of one turn."""
 
     actions: list[Action] = field(default_factory=list)  # everything that took effect
-    # strongest response due for each own boat; boats that have none are not in it
-    responses: dict[str, str] = field(default_factory=dict)
-    # own boats told to stop by their links, past the shield: their state is not known, or they were handed over
-    # beyond the hard line
+    responses: dict[str, str] = field(default_factory=dict)  # strongest response by own boat; only where one is due
+    # own boats that their links stop, bypassing the shield: in unknown state, or handed over beyond the hard line
     unknown: set[str] = field(default_factory=set)
-    # own boats that do not obey us now (another mode, disarmed): nothing is sent to them
-    idle: set[str] = field(default_factory=set)
-    dropped: set[str] = field(default_factory=set)  # contacts the operator had left out
-    # boats to be taken back now that the fail-safe that took them is over
-    retake: set[str] = field(default_factory=set)
+    idle: set[str] = field(default_factory=set)  # own boats that do not obey (mode, disarmed): nothing is sent to them
+    dropped: set[str] = field(default_factory=set)  # lost contacts that the operator's override leaves out
+    retake: set[str] = field(default_factory=set)  # boats to take back: the fail-safe that took them is over
 
 
 class Failsafe:
-    """Holds each turn of the tracker's boats against the table; remembers since when things are wrong.
+    """Check of each turn against the table; remembers since when faults last.
 
     Attributes:
-        handed_over: boats stopped beyond the hard line, until somebody takes them.
+        handed_over: boats stopped beyond the hard line, until a pilot or the operator takes them.
     """
 
     def __init__(self, fleet: FleetFile, tracker: Tracker) -> None:
@@ -85,7 +80,7 @@ class Failsafe:
         for name, row in CONDITIONS.items():
             key = row.response.partition("`")[2].partition("`")[0] if row.response.startswith("`") else ""
             response = setting(key, fleet.limits, fleet.end) if key else row.response
-            self._responses[name] = response if response in STRENGTH else "stop"  # all others are a link's own stop
+            self._responses[name] = response if response in STRENGTH else "stop"  # other texts mean a link's own stop
             if row.within.startswith("`"):
                 self._after_s[name] = setting(row.within.strip("`"), fleet.limits, fleet.end)
         self._good_s: dict[str, float] = {}
@@ -93,7 +88,7 @@ class Failsafe:
         self._outside_s: dict[str, float] = {}
 
     def judge(self, seen: Seen) -> Verdict:
-        """Hold everything against its limit."""
+        """Compare every input with its limit."""
         self._seen, self._verdict = seen, Verdict()
         usable, fault = self._usable_commands(seen.answer)
         for boat in self._boats:
@@ -118,9 +113,9 @@ class Failsafe:
     def _due(
         self, name: str, subject: str, text: str, boats: Collection[str] | None = None, response: str | None = None
     ) -> None:
-        """Note a row of the table that took effect, unless it is overridden.
+        """Add a row of the table that took effect, unless it is overridden.
 
-        Its response, or the one given instead, concerns these boats; None: all of this process.
+        ``response`` replaces the table's and cannot be overridden. ``boats`` None: all boats of this process.
         """
         condition = name.partition(".")[0]
         if response is None:
@@ -135,7 +130,7 @@ class Failsafe:
 
     def _judge_own(self, boat: str, reading: BoatReading) -> None:
         tracker, limits, after = self._tracker, self._fleet.limits, self._after_s
-        if reading.released:  # it stays his who took it, heard or not
+        if reading.released:  # stays released, even without telemetry
             self.handed_over.discard(boat)
             self._leave(boat, reading)
             return
@@ -165,7 +160,7 @@ class Failsafe:
         self._judge_place(boat)
 
     def _leave(self, boat: str, reading: BoatReading) -> None:
-        """Nothing is sent to a boat that somebody has; one that its own fail-safe took is offered once that is over."""
+        """Send nothing to a boat that does not obey; offer or request taking it back once its own fail-safe is over."""
         self._verdict.idle.add(boat)
         text = f"{boat} does not obey: {reading.why_not or reading.mode}"
         if reading.released_by == FAILSAFE and reading.failsafe_over:
@@ -176,7 +171,7 @@ class Failsafe:
         self._due("mode.pilot", boat, text, (), response="none")
 
     def _judge_place(self, boat: str) -> None:
-        """Outside the operating area: how far, since when, and why it does not come back."""
+        """Report a boat outside the geofence: how far, for how long, and what keeps it from returning."""
         track, now_s, decided = self._tracker.track(boat), self._seen.now_s, self._seen.decided
         outside_m = 0.0 if track is None else self._fleet.geofence.outside_m(track.row[L.X], track.row[L.Y])
         if outside_m <= 0.0:
@@ -195,7 +190,7 @@ class Failsafe:
             self._due("hard_line", boat, f"{text} it back", (boat,))
 
     def _usable_commands(self, answer: Answer) -> tuple[set[str], str]:
-        """Boats whose command by the policy can be used, and what is wrong with it, in words."""
+        """Return the boats with a usable command of the policy, and the fault in words."""
         commands, names = answer.commands, self._fleet.names
         if commands is None or not answer.age_s >= 0.0:
             return set(), answer.fault
@@ -234,9 +229,9 @@ class Failsafe:
         self._due(f"contact.{state}", boat, f"contact {boat} {state}: {words(age)}{why}")
 
     def _judge_alarm(self, alarm: Alarm) -> None:
-        """Sources that contradict each other: all stories are kept clear of, or boats stop where there are too many.
+        """Respond to contradicting sources; `contact.lost_then` applies if the boat's position is unknown.
 
-        Of an own boat its own link tells: there it is only said.
+        Alarms about own boats, which have telemetry, and overridden ones are only shown.
         """
         subject = alarm.boat or "feed"
         if alarm.boat in self._boats or self._overridden("contact", alarm.boat):
@@ -248,7 +243,7 @@ class Failsafe:
 
 
 class Responder:
-    """Turns responses of one boat into nominal commands; remembers where each began."""
+    """Nominal commands of the responses of one boat; remembers the state in which a response began."""
 
     def __init__(self, platform: Platform, fence: Geofence) -> None:
         self._top_mps, self._box = platform.max_speed_mps, fence.box
@@ -256,11 +251,11 @@ class Responder:
         self._onset: Array | None = None
 
     def clear(self) -> None:
-        """No response is due any more."""
+        """End the response."""
         self._onset = None
 
     def wanted(self, response: str, row: Array) -> tuple[float, float]:
-        """Speed, m/s, and absolute heading, rad, that a response (not "go_on") asks of the boat as it is."""
+        """Return the nominal speed, m/s, and absolute heading, rad, of a response other than "go_on"."""
         if self._onset is None or self._response != response:
             self._response, self._onset = response, row.copy()
         onset = self._onset
@@ -286,24 +281,25 @@ class Responder:
 
 
 def _rest(row: Array) -> tuple[float, float]:
-    """No speed, on the heading the boat has by now.
+    """Return zero speed on the boat's present heading.
 
-    Turned away from an edge or a boat it lets it be. Sent back to the heading it had it would have to be turned away
-    again, for which it takes thrust, and never come to rest.
+    The shield may have turned the boat away from an edge or another boat. A command back to the earlier heading would
+    make it turn away again, which takes thrust, and the boat would never come to rest.
     """
     return 0.0, math.radians(float(row[L.HEADING])) % TWO_PI
 
 
 def at_rest(readings: Mapping[str, BoatReading]) -> bool:
-    """Whether every own boat that obeys lies still."""
+    """Whether every own boat that obeys is at rest."""
     return all(not reading.ready or abs(reading.speed_mps) < REST_MPS for reading in readings.values())
 
 
 def nearing(fleet: FleetFile, tracker: Tracker, readings: Mapping[str, BoatReading]) -> list[str]:
-    """Boats that come within the separation radius of one of ours within ``end.clear_s``, a line each.
+    """Return a line for each boat that comes within the separation of an own boat within ``end.clear_s``.
 
-    A boat in HOLD is defended by nobody. Both are run straight on, their errors added; one not heard of for too long is
-    not told. A boat of ours that does not obey, because a pilot steers it, may come near the others as any boat may.
+    The shield does not protect a boat in HOLD. Both boats are extrapolated straight on, and the separation grows by
+    their errors. Boats not heard of for ``contact.lost_after_s`` are left out. Own boats that do not obey, such as
+    those a pilot steers, count as others too.
     """
     tracks = {name: tracker.track(name) for name in fleet.names}
     obeys = {name for name in tracker.commanded if name not in readings or readings[name].ready}
@@ -320,7 +316,7 @@ def nearing(fleet: FleetFile, tracker: Tracker, readings: Mapping[str, BoatReadi
 
 
 def _approach(fleet: FleetFile, own: Track | None, other: Track | None) -> tuple[float, float] | None:
-    """Least distance, m, and when, s, where two tracks come too near within the time."""
+    """Return the least distance, m, and its time, s, if two tracks come too near within ``end.clear_s``."""
     if own is None or other is None or other.age_s > fleet.limits.contact.lost_after_s:
         return None
     apart, closing = other.position_m() - own.position_m(), other.velocity_mps - own.velocity_mps
@@ -332,7 +328,7 @@ def _approach(fleet: FleetFile, own: Track | None, other: Track | None) -> tuple
 
 
 def words(age_s: float) -> str:
-    """An age as a person says it."""
+    """Return an age in words."""
     if not math.isfinite(age_s):
         return "never heard"
     return f"{age_s:.1f} s old" if age_s < WHOLE_S else f"{age_s:.0f} s old"

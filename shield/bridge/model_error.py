@@ -1,8 +1,8 @@
-"""`ModelErrorMonitor`: what the boats' models miss, measured while they are steered, and the margins it gives them.
+"""`ModelErrorMonitor`: prediction errors of the boats' models, measured during a run, and the margins they require.
 
-The place that a boat is seen at now is compared with the one its model predicted 1, 2 and 3 s ago under the commands
-that were really sent since. Quantiles of these errors become the boat's margin, within bounds: a model that is off, a
-delay longer than declared, wind and waves, a boat that obeys somebody else all show there, whatever the cause.
+The monitor compares a boat's position with those that its model predicted 1, 2 and 3 s ago from the commands sent.
+A quantile of these errors becomes the boat's model-error margin, within bounds. The errors include every cause: a wrong
+model, a delay longer than declared, wind and waves, another commander.
 """
 
 from __future__ import annotations
@@ -19,25 +19,25 @@ from ..tracks import roll_out_pending, steps_of_delay
 from .fleet_file import FleetFile
 from .messages import Action, BoatReading, Sent
 
-AHEAD_S = (1.0, 2.0, 3.0)  # how long ago what is compared was predicted, s
+AHEAD_S = (1.0, 2.0, 3.0)  # prediction horizons, s
 TOLD_BY = 1
-"""Place in `AHEAD_S` of the errors that make the margin: a backup is chosen anew long before it is carried out."""
+"""Index in `AHEAD_S` of the errors that set the margin: a backup is chosen anew long before it ends."""
 SHARE = 0.95  # quantile of the errors that a margin covers
-MEMORY_S = 60.0  # errors are remembered for so long, s
-ENOUGH_S = 5.0  # errors of at least so long are needed before they count, s
-WIDEN_MPS = 0.1  # a margin changes no faster, m/s: a jump of it would look like a breach
-WORTH_TELLING_M = 0.15  # margins beyond what was declared by more than this are told
+MEMORY_S = 60.0  # time span of the errors remembered, s
+ENOUGH_S = 5.0  # least time span of errors before they count, s
+WIDEN_MPS = 0.1  # largest rate of change of a margin, m/s: a jump would look like a separation violation
+WORTH_TELLING_M = 0.15  # excess of a margin over the declared error beyond which it is reported, m
 ROUNDING_M = 0.05
-"""Errors up to this are what messages round off: a boat that is its model is decided for as in the simulator."""
-FRESH_S = 0.3  # places older than this are no measurement, s
-LATE = 0.6  # part of a step that a turn may begin late by and still count as in its place
+"""Smaller quantiles are rounding of the messages and set no margin: decisions then equal those in the simulator."""
+FRESH_S = 0.3  # older positions are no measurement, s
+LATE = 0.6  # largest delay of a turn, in steps, that leaves no turn out
 
 
 class ModelErrorMonitor:
-    """Follows the boats of a process.
+    """Prediction errors of the boats of this process.
 
     Attributes:
-        margin_m: bound on the error of each boat's place that the shield is to count on, m.
+        margin_m: bound on each boat's position error for the shield, m, by boat name.
     """
 
     def __init__(self, fleet: FleetFile, boats: tuple[str, ...]) -> None:
@@ -58,10 +58,10 @@ class ModelErrorMonitor:
         self.margin_m = {name: float(margin) for name, margin in zip(boats, self._declared_m, strict=True)}
 
     def update(self, rows: Mapping[str, Array | None], readings: Mapping[str, BoatReading]) -> None:
-        """Take the boats as they are believed to be now (None: not known), before this turn's decision.
+        """Take in the estimated states (None: unknown), before this turn's decision.
 
-        Turns that were left out count, too: nothing was seen in them, and the command before them stayed in force. So a
-        loop that often falls behind still finds out a model that is wrong.
+        Skipped turns count as turns without measurement in which the last command stayed in force. So the monitor finds
+        a wrong model even in a loop that often falls behind.
         """
         read_s = max((reading.read_s for reading in readings.values()), default=self._read_s)
         gap_s, self._read_s = read_s - self._read_s, read_s
@@ -88,7 +88,7 @@ class ModelErrorMonitor:
             self.margin_m[name] += min(max(self._goal_m(name) - self.margin_m[name], -step), step)
 
     def sent(self, sent: Mapping[str, Sent]) -> None:
-        """Note what left at this turn."""
+        """Record the commands sent in this turn."""
         told = np.full((len(self._boats), 2), np.nan)
         for i, name in enumerate(self._boats):
             command = sent.get(name)
@@ -97,7 +97,7 @@ class ModelErrorMonitor:
         self._told.append(told)
 
     def _missed_m(self, now: Array, steps: int) -> Array:
-        """Distances between boats now and where they were predicted so many steps ago, m; NaN: no telling."""
+        """Return distances from the positions predicted ``steps`` steps ago, m; NaN if unknown."""
         if len(self._rows) <= steps or len(self._told) < steps + self._late:
             return np.full(len(self._boats), np.nan)
         then = self._rows[-1 - steps].copy()
@@ -109,13 +109,13 @@ class ModelErrorMonitor:
         return np.where(known, missed, np.nan)
 
     def _goal_m(self, name: str) -> float:
-        """Margin that a boat's errors ask for, m, within its bounds."""
+        """Return the margin that a boat's errors require, m, within its bounds."""
         missed_m = self.quantile_m(name)
         missed_m = missed_m if missed_m > ROUNDING_M else 0.0
         return max(float(self._declared_m[self._boats.index(name)]), min(missed_m, self._limit.widest_m))
 
     def quantile_m(self, boat: str, ahead: int = TOLD_BY, share: float = SHARE) -> float:
-        """Quantile of a boat's errors so far ahead (place in `AHEAD_S`), m; 0 while too little was seen."""
+        """Return a quantile of a boat's errors, m; ``ahead`` is an index in `AHEAD_S`; 0 with too few errors."""
         errors = self._errors[:, self._boats.index(boat), ahead]
         errors = errors[np.isfinite(errors)]
         if len(errors) < ENOUGH_S / self._dt_s:
@@ -124,16 +124,16 @@ class ModelErrorMonitor:
         return float(np.partition(errors, place)[place])
 
     def latest_m(self, boat: str) -> tuple[float, ...]:
-        """How far a boat is at this turn from where it was predicted, for each of `AHEAD_S`, m; NaN: no telling."""
+        """Return a boat's prediction errors of this turn for each of `AHEAD_S`, m; NaN if unknown."""
         row = self._errors[(self._number - 1) % len(self._errors), self._boats.index(boat)]
         return tuple(row.tolist())
 
     def outside_s(self, boat: str) -> float:
-        """How long a boat has been far outside its model, s."""
+        """Return how long a boat's error has exceeded ``limits.model.outside_m``, s; time below it counts back."""
         return float(self._outside_s[self._boats.index(boat)])
 
     def actions(self) -> list[Action]:
-        """Boats whose margin was widened, with what their model misses."""
+        """Return an action for each boat with a widened margin, with its prediction errors."""
         found = []
         for name, declared in zip(self._boats, self._declared_m, strict=True):
             margin, goal = self.margin_m[name], self._goal_m(name)

@@ -1,8 +1,8 @@
-"""`Tracker`: where every boat of the file is now: own boats by telemetry and model, others by contacts.
+"""`Tracker`: current states of all boats of the fleet file; own ones from telemetry and model, others from contacts.
 
-Sources that agree about a boat tell one story: its surest fix counts, with an error that covers what the others say.
-Sources that contradict each other tell several, and each may be the true one, the newest no more than another: the boat
-is kept clear of wherever one of them has it.
+Sources that agree about a boat form one group. Its most precise fix counts, with an error that covers the others.
+Sources that contradict each other form several groups, and any of them may be right, whatever their ages.
+The shield keeps clear of all positions so reported.
 """
 
 from __future__ import annotations
@@ -24,26 +24,26 @@ from .messages import NEVER_S, Alarm, BoatReading, Contact, Sent
 
 LOG = logging.getLogger(__name__)
 TALK_EVERY_S, MOST_TOLD = 5.0, 256
-"""The same fault of a boat is logged again after so long, and so many are remembered: names on a feed are anybody's."""
-GHOST = "~"  # names of ghosts are the boat's name, this and a number; no boat of a fleet file has it in its name
-FARTHEST_M = 1e5  # positions farther from the field's corner than this are faults
+"""Interval between logs of the same fault of a boat, s; faults remembered (a feed may send any number of names)."""
+GHOST = "~"  # a ghost is named after its boat, plus this and a number; no boat name in a fleet file contains it
+FARTHEST_M = 1e5  # positions farther from the field's corner are faults
 SPEED_SHARE, SPEED_MORE_MPS = 2.0, 1.0
-"""Speeds beyond this share of the platform's top plus this much are faults: current and wind give less."""
-JUMP_M = 3.0  # differences from where the boat must be that no receiver's noise explains, m
+"""Speeds beyond this share of the platform's top speed plus this are faults: current and wind add less."""
+JUMP_M = 3.0  # deviation from the expected position that receiver noise does not explain, m
 BELIEVED_AFTER_S = 2.0
-"""A new place told consistently for this long is believed, s, if nobody else sees the boat elsewhere."""
+"""A new position reported consistently for this long is accepted, s, unless another source sees the boat elsewhere."""
 MOVED_M, FROZEN_M = 0.05, 0.6
-"""A position that moved less than the first while the boat's speed says it ran the second is frozen, m."""
-UNDER_WAY_MPS = 0.2  # slower boats may well stay where they are: noise of the speed is no way run
-EARLY_S = 0.1  # contacts fixed later than now by more than this are faults of a clock
+"""A position is frozen if it moved less than the first while the speed integrates to more than the second, m."""
+UNDER_WAY_MPS = 0.2  # lower speeds are not integrated: they may be noise of a boat at rest
+EARLY_S = 0.1  # contacts dated farther in the future than this are clock faults
 MOST_SOURCES, MOST_STORIES = 32, 3
-"""Sources remembered of a boat; places kept clear of for it: when more are told nobody knows where it is."""
+"""Sources remembered per boat; positions of it that the shield keeps clear of. With more, its position is unknown."""
 VAGUE_M = 10.0
-"""A place known no better than this cannot be kept clear of: it widens no surer one; as a rival it is one too many."""
+"""A position with a larger error does not widen that of a more precise one. As a rival it makes `View.crowded` true."""
 
 
 def _apart(one: Contact, other: Contact) -> tuple[float, float]:
-    """How far apart two have a boat, m, the older one run straight on, and how much older it is, s."""
+    """Return the distance of two contacts, m, the older extrapolated straight on, and their age difference, s."""
     older, newer = sorted((one, other), key=lambda contact: contact.fixed_s)
     seconds = newer.fixed_s - older.fixed_s
     way = older.speed_mps * seconds
@@ -53,10 +53,10 @@ def _apart(one: Contact, other: Contact) -> tuple[float, float]:
 
 
 class Gate:
-    """Lets fixes of one boat by one source through, or says why not.
+    """Plausibility check of one source's fixes of one boat.
 
-    A jump is refused at first. A boat that keeps saying the same new place is believed in the end: receivers do settle
-    on a better fix, and a track that never comes back would be worse.
+    A jump is refused at first. A new position that the source keeps reporting is accepted in the end: receivers do
+    settle on a better fix, and losing the track for good would be worse.
     """
 
     def __init__(self, fastest_mps: float) -> None:
@@ -68,10 +68,10 @@ class Gate:
         self._doubted_since_s = 0.0
 
     def refuse(self, fix: Contact, witness: Contact | None = None) -> str:
-        """Why this fix is not taken; empty: it is taken.
+        """Return why this fix is refused; empty if it is accepted.
 
-        The witness is where somebody else lately saw the boat; None: nobody did. It never refuses a fix that goes on
-        from the last one taken: it may be the one that is wrong.
+        ``witness`` is a recent contact by other sources, or None. A fix that continues from the last accepted one is
+        never refused because of the witness: the witness may be wrong.
         """
         (x_m, y_m), speed_mps, last = fix.position_m, abs(fix.speed_mps), self._last
         if not np.isfinite((x_m, y_m, fix.heading_rad, speed_mps, fix.fixed_s)).all():
@@ -97,7 +97,7 @@ class Gate:
         return ""
 
     def _is_frozen(self, fix: Contact) -> bool:
-        """Whether the position stays although the boat is under way; its time stamps may be fresh all the same."""
+        """Whether the position stays although the boat reports speed, even with fresh time stamps."""
         still = self._still
         if still is None or math.dist(fix.position_m, still.position_m) > MOVED_M:
             self._still, self._run_m = fix, 0.0
@@ -107,26 +107,26 @@ class Gate:
         return self._run_m > FROZEN_M
 
     def _is_near(self, before: Contact, fix: Contact) -> bool:
-        """Whether the boat can have come from there, whatever it did on the way."""
+        """Whether the boat can have moved from one fix to the other, by any manoeuvre."""
         apart_m, seconds = _apart(before, fix)
         return apart_m <= JUMP_M + 2.0 * self._fastest * min(seconds, BELIEVED_AFTER_S)
 
 
 @dataclass(frozen=True)
 class View:
-    """What must be believed of one boat."""
+    """Where one boat may be, by all its sources."""
 
-    contact: Contact  # of the story told first by a source that still speaks
-    rivals: tuple[Contact, ...] = ()  # of the stories that contradict it
-    text: str = ""  # who contradicts whom, in words; empty: nobody
-    crowded: bool = False  # whether more is told than can be kept clear of
+    contact: Contact  # of the first group; sources still heard come first, in the order they were first heard
+    rivals: tuple[Contact, ...] = ()  # of the groups that contradict it
+    text: str = ""  # which sources contradict each other, in words; empty: none
+    crowded: bool = False  # whether there are positions that the shield cannot keep clear of
 
 
 class ContactFusion:
-    """Where others say one boat is, by source, and what must be believed of all they say.
+    """Latest contact of one boat by source, and their fusion.
 
-    Who said something longer ago than ``max_age_s`` is silent; what was said longer ago than ``lost_after_s`` counts
-    only where nobody said anything later.
+    A source is silent if its contact is older than ``max_age_s``. A contact older than ``lost_after_s`` counts only if
+    no source has a newer one.
     """
 
     def __init__(self, fastest_mps: float, max_age_s: float, lost_after_s: float) -> None:
@@ -135,16 +135,16 @@ class ContactFusion:
         self._latest: dict[str, Contact] = {}
 
     def take(self, contact: Contact, now_s: float) -> str:
-        """Take a contact in; why it is not believed, empty: it is, or it is nothing new."""
+        """Take in a contact; return why it is refused, or empty if it is accepted or not new."""
         source, known = contact.source, self._latest.get(contact.source)
         if known is not None and contact.fixed_s <= known.fixed_s:
-            return ""  # the same fix, or one that came late
+            return ""  # the same fix, or one received late
         if not 0.0 <= contact.error_m < math.inf:
             return f"error {contact.error_m} m is no bound"
         if contact.fixed_s > now_s + EARLY_S:
             return f"fixed {contact.fixed_s - now_s:.1f} s in the future"
         if source not in self._gates:
-            if len(self._gates) >= MOST_SOURCES:  # forget the one whose last word is oldest
+            if len(self._gates) >= MOST_SOURCES:  # forget the source with the oldest contact
                 heard_s = {name: -math.inf for name in self._gates}
                 heard_s |= {name: latest.fixed_s for name, latest in self._latest.items()}
                 oldest = min(heard_s, key=heard_s.__getitem__)
@@ -157,13 +157,13 @@ class ContactFusion:
         return text
 
     def view(self, now_s: float) -> View | None:
-        """What must be believed now; None: nobody ever told of it."""
+        """Fuse the contacts; None if there never was one."""
         ages = {source: now_s - contact.fixed_s for source, contact in self._latest.items()}
         lately = [source for source, age in ages.items() if age <= self._lost_after_s]
         lately = lately or sorted(ages, key=ages.__getitem__)[:1]
         if not lately:
             return None
-        lately.sort(key=lambda source: ages[source] > self._max_age_s)  # who still speaks, and was heard first
+        lately.sort(key=lambda source: ages[source] > self._max_age_s)  # sources still heard first
         stories: list[list[Contact]] = []
         for contact in (self._latest[source] for source in lately):
             agreeing = [story for story in stories if self._agree(story[0], contact)]
@@ -178,7 +178,7 @@ class ContactFusion:
         return apart_m <= room_m + self._fastest_mps * min(between_s, BELIEVED_AFTER_S)
 
     def _surest(self, story: list[Contact], now_s: float) -> Contact:
-        """The surest contact of a story; where another's bound and its own exclude each other it covers both."""
+        """Return the most precise contact of a group; its error grows to cover contacts its bound excludes."""
         surest = min(story, key=lambda contact: contact.error_m + self._fastest_mps * (now_s - contact.fixed_s))
         error_m = surest.error_m
         for other in story:
@@ -203,12 +203,12 @@ def _contradiction(contact: Contact, others: list[Contact]) -> str:
 
 @dataclass(frozen=True)
 class Track:
-    """One boat now."""
+    """Estimate of one boat."""
 
     row: Array  # (N_STATE,) state; NaN memory where unknown
-    ahead_s: float  # time since the row was true, s: 0 for own boats, whose model is run on to now
-    age_s: float  # time since the oldest measurement it rests on, s
-    error_m: float  # bound on its position, without what age adds, m
+    ahead_s: float  # age of ``row``, s: 0 for own boats, whose model is rolled out to the present
+    age_s: float  # age of the oldest measurement used, s
+    error_m: float  # bound on the position error without the part that grows with age, m
 
     @property
     def velocity_mps(self) -> Array:
@@ -217,16 +217,16 @@ class Track:
         return np.asarray(self.row[L.SPEED] * np.array([np.sin(heading), np.cos(heading)]))
 
     def position_m(self, longest_s: float = math.inf) -> Array:
-        """Position now, run straight on for at most so long, m."""
+        """Return the position, m, extrapolated straight on for at most ``longest_s``."""
         return np.asarray(self.row[: L.Y + 1] + min(self.ahead_s, longest_s) * self.velocity_mps)
 
 
 class Tracker:
-    """Keeps the tracks of all boats of a file, ``commanded`` those of this process.
+    """Tracks of all boats of a fleet file; ``commanded`` names the own boats, those of this process.
 
     Attributes:
-        faults: why the latest fix of a boat was refused, by name.
-        margin_m: margins of own boats for what their models miss, m, see `model_error`.
+        faults: why a fix was refused in the last `update`, by boat name.
+        margin_m: model-error margins of own boats, m, see `model_error`.
     """
 
     def __init__(self, fleet: FleetFile, commanded: Iterable[str]) -> None:
@@ -247,11 +247,11 @@ class Tracker:
         self._now_s = -math.inf
 
     def update(self, now_s: float, readings: Mapping[str, BoatReading], contacts: Iterable[Contact]) -> None:
-        """Take what came in, and run own boats on to now."""
+        """Take in readings and contacts, and roll own boats out to ``now_s``."""
         self._now_s, self.faults = now_s, {}
         for name, estimator in self._estimators.items():
             estimator.advance(now_s)
-            if name in readings and math.isfinite(readings[name].age_s):  # else something was never received: no fix
+            if name in readings and math.isfinite(readings[name].age_s):  # an infinite age: a field was never received
                 self._take_reading(name, readings[name], estimator)
         for contact in contacts:
             fusion = self._fusion.get(contact.boat)
@@ -265,19 +265,19 @@ class Tracker:
                 if view.text:
                     self._log(name, "contradicted", f"contradicted: {view.text}")
         for name, estimator in self._estimators.items():
-            seen = self._agreed(name)  # the feed says where an own boat is when its own telemetry does not
+            seen = self._agreed(name)  # the feed replaces telemetry of an own boat that is too old
             if seen is not None and self.navigation_age_s(name) > self.fleet.limits.navigation.max_age_s:
                 estimator.correct(_reading_of(seen, now_s))
                 self._fed_m[name] = seen.error_m
 
     def sent(self, tick_s: float, sent: Mapping[str, Sent]) -> None:
-        """Note what left at the tick of that time."""
+        """Record the commands sent at the tick of that time."""
         for name, message in sent.items():
             if message.delivered and math.isfinite(message.speed_mps):
                 self._estimators[name].sent(tick_s, message.heading_rad, message.speed_mps)
 
     def track(self, name: str) -> Track | None:
-        """The boat now; None: never seen."""
+        """Return the boat's track; None if it was never seen."""
         own = self._own_track(name)
         if own is None or own.age_s > self.fleet.limits.navigation.lost_after_s:
             view = self._views.get(name)
@@ -287,14 +287,14 @@ class Tracker:
         return own
 
     def ghosts(self, name: str) -> tuple[Track, ...]:
-        """Where else a boat may be, by those who contradict the source of its track; none while its own link tells."""
+        """Return other possible tracks of a boat, from contradicting sources; none while its own link is heard."""
         own, view = self._own_track(name), self._views.get(name)
         if view is None or (own is not None and own.age_s <= self.fleet.limits.navigation.lost_after_s):
             return ()
         return tuple(self._track_of(contact) for contact in view.rivals)
 
     def own_rows(self) -> dict[str, Array | None]:
-        """State of each own boat as its model and telemetry have it; None: not known, or its telemetry is old."""
+        """Return the estimate of each own boat; None if unknown, refused in this turn, or with old telemetry."""
         found: dict[str, Array | None] = {}
         for name, estimator in self._estimators.items():
             estimate = estimator.estimate(self._now_s)
@@ -303,31 +303,31 @@ class Tracker:
         return found
 
     def navigation_age_s(self, name: str) -> float:
-        """Age of an own boat's telemetry, s; inf: nothing yet."""
+        """Return the age of an own boat's telemetry, s; inf if there is none."""
         return self._now_s - self._telemetry_s.get(name, -NEVER_S)
 
     def known_age_s(self, name: str) -> float:
-        """Age of what is known of an own boat, by its telemetry or by the feed in its place, s; inf: nothing yet."""
+        """Return the age of an own boat's state, from telemetry or the feed, s; inf if there is none."""
         own = self._own_track(name)
         return NEVER_S if own is None else own.age_s
 
     def contact_age_s(self, name: str) -> float:
-        """Age of what is known of another boat, s; inf: nothing yet."""
+        """Return the age of another boat's contact, s; inf if there is none."""
         view = self._views.get(name)
         return NEVER_S if view is None else max(0.0, self._now_s - view.contact.fixed_s)
 
     def contradicted(self, name: str) -> str:
-        """Who contradicts whom about where a boat is, in words; empty: nobody."""
+        """Return which sources contradict each other about a boat, in words; empty if none."""
         view = self._views.get(name)
         return "" if view is None else view.text
 
     def alarms(self) -> tuple[Alarm, ...]:
-        """Boats whose sources contradict each other."""
+        """Return an alarm for each boat whose sources contradict each other."""
         views = ((name, self._views.get(name)) for name in self.fleet.names)
         return tuple(Alarm(view.text, name, view.crowded) for name, view in views if view is not None and view.text)
 
     def seen_now(self) -> Array:
-        """(n, 4) of all boats of the file: x m, y m, heading deg, speed m/s, run on to now; NaN where never seen."""
+        """Return (n, 4) of all boats of the file, extrapolated: x m, y m, heading deg, speed m/s; NaN if never seen."""
         seen = np.full((len(self.fleet.names), 4), np.nan)
         for i, name in enumerate(self.fleet.names):
             track = self.track(name)
@@ -336,14 +336,16 @@ class Tracker:
         return seen
 
     def assemble(self, controlled: Collection[str], without: Collection[str] = ()) -> Fleet | None:
-        """The fleet the shield is given: every boat ever seen, with ages and errors; None when none is known.
+        """Return the shield's input: every boat ever seen, with ages and errors; None if no boat is known.
 
-        The order is the file's, so that the shield's memory survives what comes and goes. A track is run on by its age
-        up to ``contact.lost_after_s`` and its error grows until then; a ghost that grew for ever would in the end drive
-        our boats off the water. It is to decide for the boats ``controlled``.
+        The boats are in the file's order, so that the shield's memory survives boats that appear and vanish. Tracks are
+        extrapolated, and their errors grow, up to ``contact.lost_after_s``: without that limit the growing region would
+        in the end drive own boats off the water.
+
+        The shield decides for the boats ``controlled``; those in ``without`` are left out.
 
         Raises:
-            FleetError: what is known makes no fleet.
+            FleetError: the tracks make no valid fleet.
         """
         file = self.fleet
         tracks = {name: self.track(name) for name in file.names if name not in without}
@@ -400,7 +402,7 @@ class Tracker:
         self._fed_m.pop(name, None)
 
     def _agreed(self, name: str) -> Contact | None:
-        """Where others lately saw an own boat, if all who tell of it agree."""
+        """Return a recent contact of an own boat, if all its sources agree."""
         view = self._views.get(name)
         if view is None or view.text or self._now_s - view.contact.fixed_s > self.fleet.limits.contact.max_age_s:
             return None
