@@ -55,7 +55,7 @@ class ChainHead:
         """
         try:
             found = cls(**json.loads(text))
-            sound = len(bytes.fromhex(found.head)) == _BYTES and 0 <= int(found.count) < MOST
+            sound = len(bytes.fromhex(found.head)) == _BYTES and type(found.count) is int and 0 <= found.count < MOST
         except (TypeError, ValueError, RecursionError):
             sound = False
         if not sound:

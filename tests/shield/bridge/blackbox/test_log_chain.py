@@ -261,3 +261,9 @@ def test_a_log_of_another_version_is_refused_by_the_one_that_wrote_it(log, tmp_p
     write_records(tmp_path / "old.mcap", [records[0].with_content(version=1, versions=versions), *records[1:]])
     with pytest.raises(LogError, match=r"version 1, .* use the one that wrote it, steerclear 0.6.1"):
         LogReader(tmp_path / "old.mcap")
+
+
+@pytest.mark.parametrize("count", ['"3"', "1.5", "true", "-1", "1e400"])
+def test_a_head_whose_count_is_no_whole_number_is_damaged(count):
+    with pytest.raises(LogError, match="holds no head of its chain"):
+        ChainHead.from_text(f'{{"head": "{"0" * 64}", "count": {count}}}')
