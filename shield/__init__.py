@@ -1,4 +1,4 @@
-"""The safety shield: wanted heading and speed in, safe heading and speed out."""
+"""The safety shield: nominal heading and speed in, filtered heading and speed out."""
 
 from .commands import Commands
 from .config import ShieldConfig

@@ -1,6 +1,6 @@
-"""Arrays that are handed over: they become one type and one layout, or are refused; likely mistakes of units are told.
+"""Conversion of arrays from callers to one type and layout, or an error; warnings about likely mistakes of units.
 
-Compiled code would be compiled anew for each other kind of array, and would round in whole numbers.
+Other kinds of arrays would be compiled anew, and whole numbers would round.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ LARGEST_WHOLE = 2**53
 """Whole numbers given as floats are exact up to here."""
 
 MOST_RAD = 10.0
-"""Headings beyond this are hardly radians: a heading of a turn and a half, plus rounding."""
+"""Headings beyond this are probably not radians: a turn and a half, plus rounding."""
 
 _said: set[str] = set()
 
 
 class NoNumbersError(ValueError):
-    """What was given holds no numbers; its text says why, for the message of whoever asked."""
+    """A value holds no numbers; the text says why, for the caller's message."""
 
 
 def numbers(value: Any, bools: bool = False) -> Array:
-    """Numbers of any kind as float64, C order, aligned, writeable; an array that is so already is handed on as it is.
+    """Return numbers of any kind as float64, C order, aligned, writeable; an array of this kind is returned itself.
 
     Args:
         value: numbers, in lists, arrays, tensors; None is NaN.
-        bools: True and False are 1 and 0; else they are no numbers: a mask in the place of a speed is a mistake.
+        bools: accept True and False as 1 and 0; otherwise they are an error: a mask in place of a speed is a mistake.
 
     Raises:
         NoNumbersError: it holds something else: texts, complex numbers, masked values, rows of unlike length.
@@ -48,10 +48,10 @@ def numbers(value: Any, bools: bool = False) -> Array:
 
 
 def truths(value: Any) -> BoolArray:
-    """True or False of each entry, laid out likewise; 0 and 1 will do.
+    """Return True or False of each entry, laid out likewise; 0 and 1 are accepted.
 
     Raises:
-        NoNumbersError: an entry is neither, as NaN.
+        NoNumbersError: an entry is neither, such as NaN.
     """
     if type(value) is np.ndarray and value.dtype == np.bool_ and value.flags.carray:
         return value
@@ -63,7 +63,7 @@ def truths(value: Any) -> BoolArray:
 
 
 def whole_numbers(value: Any) -> IntArray:
-    """Whole numbers as int64, laid out likewise, exact.
+    """Return whole numbers as int64, laid out likewise, exact.
 
     Raises:
         NoNumbersError: an entry is a fraction, not finite or beyond what int64 (as a float: 2^53) holds.
@@ -83,10 +83,12 @@ _SORTS: dict[Callable[[Any], Any], str] = {numbers: "numbers", truths: "True or 
 
 
 def shaped(name: str, value: Any, shape: tuple[int | None, ...], brought: Callable[[Any], Any] = numbers) -> Any:
-    """An array of that shape (None matches any length), as compiled code takes it; nothing at all fits any.
+    """Return an array of that shape (None matches any length), as compiled code takes it.
+
+    An empty list fits any shape whose first length may be 0.
 
     Raises:
-        FleetError: it is none; ``name`` says of what.
+        FleetError: it is not such an array; ``name`` says which argument.
     """
     expected = tuple("n" if size is None else size for size in shape)
     try:
@@ -103,7 +105,7 @@ def shaped(name: str, value: Any, shape: tuple[int | None, ...], brought: Callab
 
 
 def holds_bools(value: Any) -> bool:
-    """Whether an entry is True or False, Python's, numpy's or a tensor's, at any depth of lists and tuples."""
+    """Return whether an entry is True or False (Python, numpy or tensor), at any depth of lists and tuples."""
     if type(value) in (list, tuple):
         return any(map(holds_bools, value))
     if isinstance(value, np.ndarray) and value.dtype.kind == "O":
@@ -112,7 +114,7 @@ def holds_bools(value: Any) -> bool:
 
 
 def _plain(value: Any) -> np.ndarray:
-    """An array of a numeric type."""
+    """Return an array of a numeric type."""
     try:
         found = np.asarray(_without_gradient(value))
         if np.ma.is_masked(value):
@@ -123,7 +125,7 @@ def _plain(value: Any) -> np.ndarray:
             found = np.array([np.nan if entry is None else float(entry) for entry in found.flat]).reshape(found.shape)
     except NoNumbersError:
         raise
-    except Exception as error:  # what is handed over may be anything, and raise anything
+    except Exception as error:  # foreign objects may raise anything
         raise NoNumbersError(_short(error)) from None
     if found.dtype.kind not in "iufb":
         raise NoNumbersError(f"they are {'texts' if found.dtype.kind in 'US' else found.dtype}")
@@ -131,7 +133,7 @@ def _plain(value: Any) -> np.ndarray:
 
 
 def _without_gradient(value: Any) -> Any:
-    """A tensor's numbers, wherever they are and whatever belongs to them, in lists too; anything else as it is."""
+    """Return a tensor's numbers, from any device and without its gradient, in lists too; anything else unchanged."""
     if type(value) in (list, tuple):
         return [_without_gradient(entry) for entry in value]
     if not hasattr(value, "detach"):
@@ -146,14 +148,14 @@ def _short(what: object, length: int = 120) -> str:
 
 
 def say_once(topic: str, words: str) -> None:
-    """Log a warning, the first time a topic comes up in this process."""
+    """Log a warning the first time a topic comes up in this process."""
     if topic not in _said:
         _said.add(topic)
         _LOG.warning(words)
 
 
 def hint_at_degrees(what: str, heading_rad: Array, remedy: str) -> None:
-    """Say so, once, if headings in rad look like degrees."""
+    """Warn once if headings in rad look like degrees."""
     largest = np.abs(heading_rad).max(initial=0.0, where=np.isfinite(heading_rad))
     if largest > MOST_RAD:
         turns = largest / (2.0 * np.pi)

@@ -1,4 +1,4 @@
-"""`BatchedShield`: the same decision for thousands of games, compiled, no Python in the loop."""
+"""`BatchedShield`: the decisions of `Shield` for thousands of games, compiled, without Python in the loop."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ from .surroundings import OPEN_WATER, Surroundings
 class BatchedShield:
     """`Shield` for B games of the same fleet.
 
-    Decisions are those of `Shield`, bit for bit: it is a batch of one. Tracks are taken as fresh and exact up to
-    ``position_error_m``. It decides for one thread at a time, as `Shield` does.
+    Decisions are those of `Shield`, bit for bit: it is a batch of one. Tracks are taken as fresh, and exact up to
+    ``position_error_m``. It serves one thread at a time, as `Shield` does.
 
     Args:
         config: settings; coordination must be "team".
@@ -35,16 +35,16 @@ class BatchedShield:
         platforms: platforms of the n boats.
         team: team of the n boats.
         surroundings: static constraints, the same for all games.
-        flag_of: team whose flag's circle the surroundings' ``stops`` are; None: nobody's in particular.
-        threads: threads that share the games; what is decided is the same, bit for bit. More than cores are no use.
+        flag_of: team around whose flag the circle in the surroundings' ``stops`` is; None: no particular team.
+        threads: threads that share the games; decisions are the same, bit for bit. More threads than cores do not help.
 
     Attributes:
-        sent: (B, n, 2) commands of the last decisions; this and the others are written anew by every call.
-        reason: (B, n) why each is what it is, values of `decision.Reason`.
-        serves: the team it has decided for since `reset`, where games use it; None: none yet.
+        sent: (B, n, 2) commands of the last decisions; every call overwrites this and the other arrays.
+        reason: (B, n) reason of each, values of `decision.Reason`.
+        serves: the team that games have used it for since `reset`; None: none yet.
 
     Raises:
-        ConfigError: a setting that a batch cannot honour, or that is none.
+        ConfigError: a setting that a batch does not support, or that is invalid.
     """
 
     def __init__(
@@ -94,7 +94,7 @@ class BatchedShield:
 
     @property
     def remembered(self) -> dict[str, Array]:
-        """What goes on from decision to decision, by name: live arrays, (B, ...). Copies written back go on there."""
+        """Memory from decision to decision, by name: live arrays, (B, ...). Copies written back continue from there."""
         return self._deciders.remembered
 
     def reset(self, mask: BoolArray | None = None) -> None:
@@ -120,21 +120,22 @@ class BatchedShield:
         visiting: BoolArray | None = None,
         driven: Array | None = None,
     ) -> Array:
-        """Safe commands.
+        """Return filtered commands.
 
         Args:
-            state: (B, n, N_STATE) boat states; memory of the autopilot that is NaN is filled from the speed, not
-                followed as `Shield` does.
-            wanted: (B, n, 2) speed m/s and relative heading deg, as `Commands.game_deg`: games limit speeds themselves.
+            state: (B, n, N_STATE) boat states; autopilot memory that is NaN is filled from the speed, not estimated as
+                `Shield` does.
+            wanted: (B, n, 2) nominal speed m/s and relative heading deg, as `Commands.game_deg`: games limit speeds
+                themselves.
             ours: (B, n) boats to decide for.
-            visiting: (B, n) boats on the other team's side, see `Fleet.visiting`; None: of none it is known.
-            driven: (B, n, 4) of boats that the games drive, see `Fleet.driven`; rows of NaN, or None, where nothing is
-                known. Those not decided for are predicted as such.
+            visiting: (B, n) boats on the other team's side, see `Fleet.visiting`; None: not known of any.
+            driven: (B, n, 4) motion of boats that the games drive, see `Fleet.driven`; rows of NaN, or None, where
+                nothing is known. Those not decided for are predicted accordingly.
 
         Returns:
-            (B, n, 2) commands; rows of boats not decided for, and of those that pass, bit for bit as wanted. The
-            array is reused by the next call. ``reason`` and ``safety_margin_m`` (B, n) tell why, ``cut_short`` (B,)
-            which decisions were ended by `ShieldConfig.work_budget`.
+            (B, n, 2) commands; rows of boats not decided for, and of those that pass, are ``wanted`` bit for bit. The
+            next call overwrites the array. ``reason`` and ``safety_margin_m`` (B, n) say why; ``cut_short`` (B,) which
+            decisions `ShieldConfig.work_budget` ended.
 
         Raises:
             FleetError: an array has the wrong shape or holds no numbers, or a state is not finite.
@@ -155,17 +156,17 @@ class BatchedShield:
         visiting: BoolArray | None = None,
         driven: Array | None = None,
     ) -> BoolArray:
-        """Which of k candidate commands would pass as they are in this step, (B, n, k); see `masks`.
+        """Return which of k candidate commands would pass unchanged in this step, (B, n, k); see `masks`.
 
         Args:
-            state: as all others but the actions as of `decide`.
-            actions: (B, n, k, 2) speed m/s and relative heading deg; all pass of boats not decided for.
-            ours: as of `decide`.
-            visiting: as of `decide`.
-            driven: as of `decide`.
+            state: as all others but the actions, as in `decide`.
+            actions: (B, n, k, 2) speed m/s and relative heading deg; all pass for boats not decided for.
+            ours: as in `decide`.
+            visiting: as in `decide`.
+            driven: as in `decide`.
 
         Raises:
-            FleetError: no candidates, or as `decide`.
+            FleetError: no candidates, or as in `decide`.
         """
         self._give(state, ours, visiting, driven)
         candidates = shaped("actions", actions, (*self.reason.shape, None, 2))
@@ -177,7 +178,7 @@ class BatchedShield:
         return passes
 
     def _give(self, state: Array, ours: BoolArray, visiting: BoolArray | None, driven: Array | None) -> None:
-        """Write all but the commands into the scene."""
+        """Write all inputs but the commands into the scene."""
         games = self.reason.shape
         state, ours = shaped("state", state, (*games, L.N_STATE)), shaped("ours", ours, games, truths)
         visiting = None if visiting is None else shaped("visiting", visiting, games, truths)
@@ -192,15 +193,15 @@ class BatchedShield:
         given[:, :, W.DRIVEN :] = np.nan if driven is None else driven
 
     def filter_for(self, team: int, shield_autopilot: bool = True) -> Any:
-        """Command filter for a batched game: ``step(actions, command_filter=shield.filter_for(0))``.
+        """Return a command filter for a batched game: ``step(actions, command_filter=shield.filter_for(0))``.
 
         Args:
             team: the team to shield.
             shield_autopilot: also decide for boats the game drives (tagged, out of bounds; never disabled ones).
 
         Raises:
-            ConfigError: no boat is of that team, or the shield was built for the other team's flag. When it is called:
-                the shield was built for other games.
+            ConfigError: no boat is of that team, or the shield was built for the other team's flag. When the filter is
+                called: the shield was built for other games.
         """
         if isinstance(team, str) or team not in self.team:
             raise ConfigError(f"no boat is of team {team!r}; give one of {sorted(set(self.team))}")

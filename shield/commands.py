@@ -1,6 +1,6 @@
-"""Commanded heading and speed of several boats, in the frame they were given in.
+"""Commanded heading and speed of several boats, in the frame in which they were given.
 
-Commands are stored as given, so that one that is safe passes bit for bit.
+Commands are stored as given, so that a safe one passes bit for bit.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from .jit import Array, BoolArray, kernel
 from .workspace import LARGEST_COMMAND
 
 ROUNDING_MPS = 1e-6
-"""A speed beyond the limit by less is that limit, rounded: it passes as it is."""
+"""A speed beyond the limit by at most this is the limit, rounded: it passes unchanged."""
 
 LARGEST_HEADING_RAD = 1e6
-"""Absolute headings beyond this are no directions, rad: turns so many that the angle left in the number is lost."""
+"""Absolute headings beyond this, rad, are not valid: too little of the angle is left in a float."""
 
 
 @kernel
 def _any_beyond(values: Array, who: BoolArray, highest_mps: Array) -> bool:
-    """Whether a speed of boats of ``who`` is beyond what their platforms do."""
+    """Return whether a speed of boats of ``who`` is beyond what their platforms do."""
     for i in range(values.shape[0]):
         if who[i] and (values[i, 0] > highest_mps[i] + ROUNDING_MPS or values[i, 0] < -ROUNDING_MPS):
             return True
@@ -36,17 +36,17 @@ def _any_beyond(values: Array, who: BoolArray, highest_mps: Array) -> bool:
 class Commands:
     """Speed and heading of n boats.
 
-    Build them with one of the class methods, which copy what they are given.
+    Build them with one of the class methods, which copy their arguments.
 
     Attributes:
-        values: (n, 2) float64: speed m/s, heading in the frame; other kinds of numbers become that.
-        relative: heading is in deg relative to the boat's present heading (as the game's actions are); otherwise in
-            rad, absolute, clockwise from north.
-        of_game: whoever obeys them limits speeds itself, as games do: the shield leaves those beyond a boat's top as
-            they are. Of others it cuts them.
+        values: (n, 2) speed m/s, and heading in the frame; converted to float64.
+        relative: the heading is in deg, relative to the boat's present heading (as the game's actions are); otherwise
+            in rad, absolute, clockwise from north.
+        of_game: the receiver limits speeds itself, as games do. The shield then leaves speeds beyond a boat's top speed
+            as they are; otherwise it cuts them.
 
     Raises:
-        FleetError: the shape is wrong, the values are not numbers (True and False are none), or ``relative`` is neither
+        FleetError: the shape is wrong, the values are not numbers (True and False are not), or ``relative`` is neither
             True nor False.
     """
 
@@ -67,22 +67,22 @@ class Commands:
 
     @classmethod
     def relative_deg(cls, values: ArrayLike) -> Commands:
-        """Commands to turn: (n, 2) of speed m/s and heading deg relative to the boat's own, clockwise."""
+        """Build commands to turn: (n, 2) of speed m/s and heading deg relative to the boat's own, clockwise."""
         return cls(_rows(values).copy(), True)
 
     @classmethod
     def game_deg(cls, values: ArrayLike) -> Commands:
-        """Commands of a game, which limits speeds itself: (n, 2) of speed m/s and relative heading deg, clockwise."""
+        """Build commands of a game, which limits speeds itself: (n, 2) of speed m/s, turn deg, clockwise."""
         return cls(_rows(values).copy(), True, True)
 
     @classmethod
     def absolute_rad(cls, values: ArrayLike) -> Commands:
-        """Commands as boats take them: (n, 2) of speed m/s and heading rad, clockwise from north."""
+        """Build commands as boats take them: (n, 2) of speed m/s and heading rad, clockwise from north."""
         return cls(_rows(values).copy(), False)
 
     @classmethod
     def absolute_deg(cls, values: ArrayLike) -> Commands:
-        """The same from degrees: (n, 2) of speed m/s and heading deg, clockwise from north. They are kept in rad."""
+        """Build commands from degrees: (n, 2) of speed m/s and heading deg, clockwise from north; stored in rad."""
         array = _rows(values).copy()
         with np.errstate(invalid="ignore"):  # infinite ones become NaN, and the shield holds the boat
             array[:, 1] = np.radians(np.fmod(array[:, 1], 360.0))
@@ -92,9 +92,9 @@ class Commands:
         return len(self.values)
 
     def as_relative_deg(self, heading_deg: Array) -> Array:
-        """Values as (speed m/s, relative heading deg); absolute headings give errors in [-180, 180).
+        """Return values as (speed m/s, relative heading deg); absolute headings give errors in [-180, 180).
 
-        Absolute ones beyond `LARGEST_HEADING_RAD` become NaN, and the shield holds the boat.
+        Absolute headings beyond `LARGEST_HEADING_RAD` become NaN, and the shield holds the boat.
         """
         if self.relative:
             return self.values
@@ -103,14 +103,14 @@ class Commands:
         return np.stack([self.values[:, 0], error], axis=1)
 
     def absolute(self, i: int, heading_rad: float) -> tuple[float, float]:
-        """Speed, m/s, and absolute heading, rad in [0, 2 pi), of boat i, whose present heading is given."""
+        """Return speed, m/s, and absolute heading, rad in [0, 2 pi), of boat i, now on ``heading_rad``."""
         speed, heading = float(self.values[i, 0]), float(self.values[i, 1])
         if self.relative:
             heading = float(heading_rad) + math.radians(heading)
         return speed, heading % (2.0 * math.pi) if math.isfinite(heading) else heading
 
     def replaced(self, changed: BoolArray, relative: Array, heading_deg: Array) -> Commands:
-        """These commands with the rows of ``changed`` taken from ``relative`` (speed m/s, relative deg)."""
+        """Return these commands with the rows of ``changed`` taken from ``relative`` (speed m/s, relative deg)."""
         values, rows = self.values.copy(), relative[changed]
         if not self.relative:
             rows = np.stack([rows[:, 0], np.radians(heading_deg[changed] + rows[:, 1])], axis=1)
@@ -118,7 +118,7 @@ class Commands:
         return self._alike(values)
 
     def _alike(self, values: Array) -> Commands:
-        """Commands of the same frame, whose values need no check: many a decision makes some."""
+        """Return commands of the same frame without checking the values: decisions make many."""
         made = object.__new__(Commands)
         made.__dict__.update(self.__dict__, values=values)
         return made
@@ -126,10 +126,10 @@ class Commands:
     def within(
         self, names: tuple[str, ...], controlled: BoolArray, highest_mps: Array
     ) -> tuple[Commands, BoolArray | None]:
-        """These commands with speeds of own boats that their platforms do (n,), m/s, and (n,) which are cut, if any.
+        """Return these commands with own boats' speeds cut to their platforms' range, and (n,) which are cut, or None.
 
-        No platform is sent astern: none has a speed below 0 in its model. What is no command at all (not finite, or
-        beyond `LARGEST_COMMAND`) is left to the decision, which holds those boats.
+        No platform is sent astern: none has a speed below 0 in its model. Commands that are not valid (not finite, or
+        beyond `LARGEST_COMMAND`) are left to the decision, which holds those boats.
         """
         if self.of_game or not _any_beyond(self.values, controlled, highest_mps):
             return self, None

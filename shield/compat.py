@@ -1,4 +1,4 @@
-"""What Python 3.10 lacks of later ones: the one place for it, so that the rest is written for 3.11."""
+"""Features of later Pythons that 3.10 lacks: the only place for them, so that the rest is written for 3.11."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`ShieldConfig`: every setting of the shield, with its unit, validated when built."""
+"""`ShieldConfig`: every setting of the shield, with its unit, validated at construction."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ PROFILES = {"competitive": (12.0, 7.0), "ramming": (math.inf, math.inf), "consta
 
 
 class Unsaid(float):
-    """A distance that nobody chose: a game's own, if larger, takes its place. It stays one in copies of settings."""
+    """A distance that nobody chose: a game's own replaces it if larger. It stays one in copies of settings."""
 
 
 class Range(NamedTuple):
-    """Numbers that a setting takes; ``low`` itself unless it is ``above`` it."""
+    """Numbers that a setting accepts; ``low`` itself unless it must be ``above`` it."""
 
     low: float
     high: float
@@ -31,7 +31,7 @@ class Range(NamedTuple):
 
 
 def _number(default: float | None, high: float = math.inf, low: float = 0.0, above: bool = False) -> Any:
-    """A setting that is a number of a range; those annotated so may be None as well."""
+    """Return a setting that is a number within a range; those annotated so may be None as well."""
     return field(default=default, metadata={"range": Range(low, high, above)})
 
 
@@ -40,35 +40,36 @@ def _number(default: float | None, high: float = math.inf, low: float = 0.0, abo
 class ShieldConfig:
     """Settings of the shield, each with its unit in its name; the page of settings says more of each and what it costs.
 
-    A number has the range that its field's metadata names: what a decision can be made for at all. With times memory
-    and work grow, what is farther off is a guess, a larger cap of margins would weigh more than the field's edge, and
-    lengths and speeds beyond theirs are of other units, as mm for m. What has no upper end may be inf.
+    The range of a number is in its field's metadata: values for which a decision can be made at all. Longer times cost
+    memory and work, and what is farther off is a guess. A larger cap of margins would outweigh the field's edge.
+    Lengths and speeds beyond their range are in other units, such as mm for m. Settings without an upper end may be
+    inf.
 
-    Where nobody gives ``separation_m`` or ``obstacle_clearance_m``, a wrapper or `games_shield` takes the distance at
+    If nobody gives ``separation_m`` or ``obstacle_clearance_m``, a wrapper or `games_shield` uses the distance at
     which its game counts a collision, or the radius of its boats, if that is larger.
 
     Raises:
         ConfigError: a value is of the wrong type, not finite or out of range.
     """
 
-    separation_m: float = _number(Unsaid(2.5), 1000.0, above=True)  # distance to keep between boat centres
+    separation_m: float = _number(Unsaid(2.5), 1000.0, above=True)  # required distance between boat centres
     buffer_m: float = _number(0.05, 50.0)  # added to the separation for rounding and sampling
     dt_s: float = _number(0.1, 2.0, 0.01)  # step of the decision loop,
-    move_s: float | None = _number(None, 1.0, 0.01)  # and of the boat model, where a command is held for several
+    move_s: float | None = _number(None, 1.0, 0.01)  # and of the boat model, if a command is held for several
     opponent_model: str = "auto"  # how opponents are predicted, see `backup.family.CERTIFICATES`
-    coordination: str = "team"  # one program for all our boats; "per_boat": one each, for boats that cannot talk
-    solver: str = "active_set"  # of the program: this one (a historical name) is compiled, others are of qpsolvers
-    adversary_horizon_s: float | None = _number(None)  # how long an opponent may do its worst; None: the profile's
-    intruder_horizon_s: float | None = _number(None)  # the same of one on our side, which can tag nobody there
-    profile: str = "competitive"  # what the opponents are taken for, see `PROFILES`
+    coordination: str = "team"  # one decision for all own boats; "per_boat": one each, for boats that cannot talk
+    solver: str = "active_set"  # of the QP: this one (a historical name) is compiled, others are of qpsolvers
+    adversary_horizon_s: float | None = _number(None)  # how long an opponent is adversarial; None: the profile's
+    intruder_horizon_s: float | None = _number(None)  # the same for one on our side, which can tag nobody there
+    profile: str = "competitive"  # kind of opponents, see `PROFILES`
     cbf_rate_per_s: float = _number(1.0, above=True)  # class-K rate alpha; inf lets a margin fall to 0
     table_cbf_rate_per_s: float = _number(0.3, above=True)  # where opponents are looked up in value tables
     static_cbf_rate_per_s: float = _number(2.0, above=True)  # from the edge, obstacles and circles
-    deadlock_timeout_s: float = _number(3.0, above=True)  # how long a teammate may keep one from turning
-    table_margin_m: float = _number(0.45, 50.0)  # added to the separation where a value table is looked into
+    deadlock_timeout_s: float = _number(3.0, above=True)  # how long a teammate may keep a boat from turning
+    table_margin_m: float = _number(0.45, 50.0)  # added to the separation where a value table is looked up
     margin_cap_m: float = _number(2.0, 50.0)  # margins above this shrink freely,
-    teammate_margin_cap_m: float = _number(0.2, 50.0)  # and from teammates of whom it is known what they will do
-    straight_horizon_s: float = _number(5.0, 60.0)  # how long courses are run on straight beyond the horizon
+    teammate_margin_cap_m: float = _number(0.2, 50.0)  # and from teammates whose motion is known
+    straight_horizon_s: float = _number(5.0, 60.0)  # how long courses continue straight beyond the horizon
     horizon_s: float | None = _number(None, 120.0, above=True)  # of backups; None: a half turn's time and 4 s
     work_budget: float = _number(200_000.0, low=1e3)  # clearances after which a decision searches no further
     min_backup_hold_s: float = _number(0.4, 10.0)  # least time on a backup, of boats that turn at once
@@ -78,11 +79,11 @@ class ShieldConfig:
     track_error_mps: float = _number(0.5, 50.0)  # growth of a neighbour's position error with the age of its track
     max_track_age_s: float = _number(2.0)  # tracks older than this are refused
     delay_s: float = _number(0.0, 10.0)  # time from decision to effect, rounded up to whole steps
-    edge_m: float | None = _number(0.2, 200.0)  # distance to keep from the field edge; None: it is not kept
-    beyond_m: float | None = _number(None, 1000.0)  # how far outside the edge its hard line lies; None: there is none
+    edge_m: float | None = _number(0.2, 200.0)  # clearance from the field edge; None: the edge is ignored
+    beyond_m: float | None = _number(None, 1000.0)  # how far outside the edge the hard line lies; None: there is none
     beyond_then: str = "flee"  # or "stop": a boat beyond the hard line, and before obstacles, see `filter.last_line`
-    obstacle_clearance_m: float = _number(Unsaid(1.0), 200.0)  # distance to keep from walls of obstacles
-    barriers: tuple[str, ...] = ()  # names of registered barriers that are kept; in one text joined by "+"
+    obstacle_clearance_m: float = _number(Unsaid(1.0), 200.0)  # clearance from walls of obstacles
+    barriers: tuple[str, ...] = ()  # names of registered barriers in force; in one text joined by "+"
 
     def __post_init__(self) -> None:
         from .backup.family import CERTIFICATES
@@ -118,23 +119,23 @@ class ShieldConfig:
 
     @property
     def effective_adversary_horizon_s(self) -> float:
-        """How long an opponent may do its worst, s: `adversary_horizon_s`, or the profile's."""
+        """How long an opponent is adversarial, s: `adversary_horizon_s`, or the profile's."""
         return PROFILES[self.profile][0] if self.adversary_horizon_s is None else self.adversary_horizon_s
 
     @property
     def effective_intruder_horizon_s(self) -> float:
-        """The same of opponents on our side of the field, s."""
+        """The same for opponents on our side of the field, s."""
         if self.intruder_horizon_s is not None:
             return self.intruder_horizon_s
         return PROFILES[self.profile][1] if self.adversary_horizon_s is None else self.adversary_horizon_s
 
     def said(self, name: str) -> bool:
-        """Whether somebody chose this setting; only of distances that a game may choose it is known that nobody did."""
+        """Return whether somebody chose this setting; False is known only of distances that a game may choose."""
         return not isinstance(getattr(self, name), Unsaid)
 
     @classmethod
     def of(cls, **settings: Any) -> ShieldConfig:
-        """Build from keyword settings; an unknown key is an error that names the nearest known one.
+        """Build from keyword settings; for an unknown key the error names the nearest known one.
 
         Raises:
             ConfigError: unknown key, or a bad value.
@@ -149,7 +150,7 @@ class ShieldConfig:
 
 
 def _barriers(barriers: object) -> tuple[str, ...]:
-    """Names of registered barriers, each once."""
+    """Return names of registered barriers, each once."""
     from .barriers.registry import get_barrier
 
     names = [name for name in barriers.split("+") if name] if isinstance(barriers, str) else barriers
@@ -165,7 +166,7 @@ _UNITS = {"per_s": "1/s", "mps": "m/s", "m": "m", "s": "s", "budget": "clearance
 
 
 def _checked(entry: Field[Any], value: Any) -> float | None:
-    """A number within its range as a float, the kind that compiled code knows it by."""
+    """Return a number within its range as a float, the type that compiled code takes."""
     name, (low, high, above) = entry.name, entry.metadata["range"]
     if value is None and entry.type == "float | None":
         return None

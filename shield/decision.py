@@ -1,4 +1,4 @@
-"""What the shield answers: one frozen `Decision` per boat, kept as arrays until somebody looks."""
+"""The shield's results: one frozen `Decision` per boat, stored as arrays until somebody reads it."""
 
 from __future__ import annotations
 
@@ -28,36 +28,36 @@ class Reason(IntEnum):
     PASSED = workspace.PASSED
     """The nominal command leaves every boat its backup; it is sent bit for bit."""
     LEAST_CHANGE = workspace.LEAST_CHANGE
-    """The command nearest to the nominal one that keeps what the backups keep, found by what `Decision.solver` names
-    and re-checked with the full boat model."""
+    """The command nearest to the nominal one that satisfies what the backups satisfy. `Decision.solver` names what
+    found it; the full boat model has verified it."""
     QP = workspace.LEAST_CHANGE
-    """The name in 0.8.0 and before, when it was said of the quadratic program's answers only."""
+    """The name in 0.8.0 and before, for answers of the QP only."""
     QP_RELAXED = workspace.QP_RELAXED
-    """Of logs of 0.2.0 and before: the program's answer with slack. Nothing sends it any more."""
+    """Only in logs of 0.2.0 and before: the QP's answer with slack."""
     BACKUP = workspace.BACKUP
-    """The boat's backup manoeuvre, which keeps clear of all boats. In 0.8.0 and before also a part of it, which is a
-    `LEAST_CHANGE` now."""
+    """The boat's backup manoeuvre, which clears all boats. In 0.8.0 and before also a part of it, since then a
+    `LEAST_CHANGE`."""
     ESCAPE = workspace.BACKUP
-    """The name of `BACKUP` in 0.2.0 and before, for whoever stored it."""
+    """The name of `BACKUP` in 0.2.0 and before, for stored data."""
     BEST_EFFORT = workspace.BEST_EFFORT
-    """No manoeuvre keeps the margin; the one that keeps most of it."""
+    """No manoeuvre satisfies the required margin; this is the best one found."""
     HELD = workspace.HELD
-    """The nominal command was not finite or absurdly large, or a registered barrier tells nothing where the boat is:
-    the boat is told to stop on its course."""
+    """The nominal command was not finite or absurdly large, or a registered barrier is unknown where the boat is. The
+    boat is commanded to stop on its course."""
     NOT_COVERED = workspace.NOT_COVERED
     """The shield does not decide for this boat."""
     RIGHT_OF_WAY = workspace.RIGHT_OF_WAY
     """Two teammates kept each other from turning: one turns away (gives way), one holds its course (stands on)."""
     LIMITED = workspace.LIMITED
-    """The wanted speed is beyond what the platform does: it is cut to that, and so it leaves every boat its backup."""
+    """The nominal speed is beyond the platform's range; cut to that, the command leaves every boat its backup."""
     STOPPED = workspace.STOPPED
-    """The boat is beyond the hard line, or would else touch an obstacle, where the settings say "stop"
-    (`ShieldConfig.beyond_then`): it is told to stop on its course, and its link's own stop is asked for."""
+    """With "stop" in the settings (`ShieldConfig.beyond_then`): the boat is beyond the hard line, or would otherwise
+    touch an obstacle. It is commanded to stop on its course, and its link is asked for its own stop."""
 
 
 SOLVERS = (None, "qp", "line_search")
-"""What finds a least change, by its number in `Decisions.solver`: the quadratic program on linearised constraints,
-among teammates; a line search between nominal command and backup, where constraints are curved."""
+"""What finds a least change, by its number in `Decisions.solver`: the QP on linearised constraints, among teammates; a
+line search between nominal command and backup, where constraints are curved."""
 
 FALLBACKS = {
     Reason.BACKUP: "backup manoeuvre",
@@ -72,7 +72,8 @@ FALLBACKS = {
 class Decision:
     """One boat's decision.
 
-    Two are equal that say the same of the same boat, NaN (commands nobody gave) for NaN, however long each took.
+    Two decisions are equal if they say the same of the same boat, with NaN (no command was given) equal to NaN,
+    however long each took.
 
     Attributes:
         boat: name of the boat.
@@ -85,15 +86,15 @@ class Decision:
         slack_m: margin given up, m.
         fallback: name of the fallback used, or None.
         solve_time_s: time of the whole decision, s.
-        no_table: names of the opponents that a value table should answer for and none does: they are run through as
-            pursuers instead, which for slow boats is the poorer word; the log says why, once. None: not known, as of
-            decisions read from a black box.
-        cut_short: whether the search for this boat's command was ended by `ShieldConfig.work_budget`: what is sent is
-            the best that was verified until then.
-        adversary_horizon_s: how long from now this boat, an opponent, was taken to do its worst before it holds its
+        no_table: names of the opponents without an applicable value table. They are simulated as pursuers instead,
+            which is less reliable for slow boats; the log says why, once. None: not known, as for decisions read from a
+            black box.
+        cut_short: whether `ShieldConfig.work_budget` ended the search for this boat's command; the command is then the
+            best one verified so far.
+        adversary_horizon_s: how long from now this boat, an opponent, was assumed to do its worst before it holds its
             course, s (0: it holds it from now on, or its way is known). None: it is no opponent, or not known.
-        outside_m: how far outside the field's edge the boat is, m; 0 inside, or where there is no field.
-        solver: what found a `LEAST_CHANGE`, "qp" or "line_search"; None: of another reason, or not known.
+        outside_m: how far outside the field's edge the boat is, m; 0 inside, or without a field.
+        solver: what found a `LEAST_CHANGE`, "qp" or "line_search"; None: another reason, or not known.
     """
 
     boat: str
@@ -121,7 +122,7 @@ class Decision:
         return hash(self._said())
 
     def _said(self) -> tuple[Any, ...]:
-        """All that counts for equality; NaN, which equals nothing, as None."""
+        """Return all that counts for equality; NaN, which equals nothing, as None."""
         values = (getattr(self, entry.name) for entry in fields(self) if entry.compare)
         return tuple(None if value != value else value for value in values)
 
@@ -141,8 +142,8 @@ class Decisions:
     ``"boat_0" in decisions`` tells whether there is one. `filtered` and the other arrays have all boats at once.
 
     Raises:
-        FleetError: indexed by a name that no boat has, or by what is neither place nor name.
-        IndexError: by a place that there is not.
+        FleetError: indexed by an unknown name, or by something that is neither place nor name.
+        IndexError: the place is out of range.
     """
 
     fleet: Fleet
@@ -152,18 +153,18 @@ class Decisions:
     reason: IntArray  # values of `Reason`
     safety_margin_m: Array
     slack_m: Array
-    bound: IntArray  # index of the binding neighbour, -1 none, -2 static constraints, -3 and below ``barriers``
+    bound: IntArray  # index of the active neighbour, -1 none, -2 static constraints, -3 and below ``barriers``
     solve_time_s: float = field(compare=False)  # of the whole decision
     no_table: BoolArray | None = None  # (n, n) own boats and opponents without a value table; None: not known
-    cut_short: BoolArray | None = None  # None: not known, taken for none
+    cut_short: BoolArray | None = None  # None: not known, taken as False
     adversary_horizon_s: Array | None = None  # NaN for boats that are no opponents; None: not known
     solver: IntArray | None = None  # places in `SOLVERS`; None: not known
-    barriers: tuple[str, ...] = ()  # names of the registered barriers that are kept
+    barriers: tuple[str, ...] = ()  # names of the registered barriers in force
     area: tuple[float, float, float, float] | None = None  # xmin, ymin, xmax, ymax of the field, m; None: there is none
 
     @classmethod
     def made(cls, **fields: Any) -> Decisions:
-        """One of all its fields, whose values need no check: a decision is made at every step."""
+        """Build from all fields without checks: a decision is made at every step."""
         made = object.__new__(cls)
         made.__dict__.update(fields)
         return made
@@ -211,7 +212,7 @@ class Decisions:
         )
 
     def _place(self, index: Any) -> int:
-        """The place of a boat in the fleet, by its name or place: no fraction, mask, True or False."""
+        """Return the place of a boat in the fleet, by its name or place: no fraction, mask, True or False."""
         names = self.fleet.names
         if isinstance(index, str):
             if index in names:
@@ -228,17 +229,17 @@ class Decisions:
         )
 
     def __str__(self) -> str:
-        """One line a boat: the nominal command, the filtered one, and why."""
+        """Return one line a boat: the nominal command, the filtered one, and why."""
         heads = ("boat", "nominal deg", "m/s", "filtered deg", "m/s", "reason", "active constraint", "margin m")
         rows = [heads, *(one._cells() for one in self)]
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        ways = "<>>>><<>"  # words stand to the left, numbers to the right
+        ways = "<>>>><<>"  # text is aligned left, numbers right
         lines = ["  ".join(map("{:{}{}}".format, row, ways, widths)) for row in rows]
         return "\n".join(line.rstrip() for line in lines)
 
     @property
     def outside_m(self) -> Array:
-        """(n,) how far outside the field's edge each boat was seen, m; 0 inside, or where there is no field."""
+        """(n,) how far outside the field's edge each boat was seen, m; 0 inside, or without a field."""
         if self.area is None:
             return np.zeros(len(self))
         low, high = np.reshape(self.area, (2, 2))

@@ -1,4 +1,4 @@
-"""Every error the package raises on bad input, as one tree. Each message names the remedy."""
+"""All errors that the package raises on bad input, as one tree. Each message names the remedy."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class GameError(SteerclearError, ValueError):
 
 
 class PolicyError(SteerclearError, ValueError):
-    """A policy is unknown, cannot be loaded, or answered something that is not a command."""
+    """A policy is unknown, cannot be loaded, or returned something that is not a command."""
 
 
 class TraceError(SteerclearError, ValueError):
@@ -40,7 +40,7 @@ class TableError(SteerclearError, ValueError):
 
 
 class BridgeError(SteerclearError, RuntimeError):
-    """Base of what can go wrong between the shield and boats."""
+    """Base of errors between the shield and boats."""
 
 
 class LinkError(BridgeError):
@@ -56,7 +56,7 @@ class FleetFileError(ConfigError):
 
 
 class FeedError(SteerclearError, ValueError):
-    """A packet of the position or game feed is not what the format says."""
+    """A packet of the position or game feed does not have the specified format."""
 
 
 class LogError(SteerclearError, ValueError):

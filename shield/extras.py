@@ -1,4 +1,4 @@
-"""What an extra of the package brings, and the one line that says so where it is missing."""
+"""The package's extras, and the error that names a missing one."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ EXTRA_OF = {
 
 
 def missing(error: ModuleNotFoundError, what: str) -> ConfigError | None:
-    """The error that names the extra to install; None when the module is of no extra.
+    """Return the error that names the extra to install; None if no extra has the module.
 
     Args:
         error: what importing raised.
-        what: what cannot be had without it, as "steerclear deploy".
+        what: the feature that needs it, such as "steerclear deploy".
     """
     module = (error.name or "").partition(".")[0]
     if module not in EXTRA_OF:
@@ -40,7 +40,7 @@ def missing(error: ModuleNotFoundError, what: str) -> ConfigError | None:
 
 
 def install_command(extra: str) -> str:
-    """The command that installs an extra: from the clone that this was installed from, or by name from an index."""
+    """Return the command that installs an extra: from the clone this was installed from, or by name from an index."""
     origin = _origin()
     url = str(origin.get("url", ""))
     if "vcs_info" in origin:
@@ -53,7 +53,7 @@ def install_command(extra: str) -> str:
 
 
 def _origin() -> dict[str, Any]:
-    """Where pip notes that it installed this from (PEP 610); empty: from an index, or nobody knows."""
+    """Return pip's record of where this was installed from (PEP 610); empty: from an index, or not known."""
     try:
         return dict(json.loads(distribution("steerclear").read_text("direct_url.json") or "{}"))
     except (PackageNotFoundError, ValueError, TypeError):

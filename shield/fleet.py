@@ -18,27 +18,27 @@ from .platforms.files import is_path
 from .renamed import FLEET, accepts_old_names
 
 FIELD = "field"
-"""What decisions name as binding where no boat is: walls, circles, edges. No boat may be called so."""
+"""Name of an active constraint that is no boat: walls, circles, edges. No boat may have this name."""
 
 LARGEST = 1e9
-"""Values beyond this (m, m/s, deg, percent) are faults of the source: squares of them lose the metres."""
+"""Values beyond this (m, m/s, deg, percent) are faults of the source: their squares lose the metres."""
 
 LARGEST_SPEED_MPS = 50.0
 """Speeds beyond this are faults of the source, m/s: such a boat would jump over the radius within a step."""
 
 LARGEST_ERROR_M = 1000.0
-"""Bounds on a position's error that are given beyond this say nothing of where a boat is, m."""
+"""Given bounds on position errors beyond this, m, say nothing about where a boat is."""
 
 LARGEST_AGE_S = 3600.0
-"""Ages of tracks that are given beyond this are times of day, or of a boat long gone, s."""
+"""Given track ages beyond this, s, are times of day, or of a boat long gone."""
 
 SMALLEST_FLEET_M = 0.05
-"""Boats that are all within so much of each other, and not at one point, are hardly given in metres."""
+"""Boats that are all this close, but not at one point, are probably not given in metres."""
 
 
 @kernel
 def sound(state: Array) -> bool:
-    """Whether what is seen of every boat is finite and of a sensible size, and its memory is that or NaN."""
+    """Return whether every boat's observed values are finite and of a sensible size, and its memory that or NaN."""
     for i in range(state.shape[0]):
         for column in range(state.shape[1]):
             if column <= L.SPEED and not abs(state[i, column]) <= LARGEST:
@@ -55,29 +55,29 @@ def sound(state: Array) -> bool:
 class Fleet:
     """State of n boats, own and others.
 
-    Build it with `Fleet.of` from plain arrays, or hand over simulator state rows directly. Arrays of the right type and
-    layout are kept, not copied (others are copied into it), and decisions are read off them: hand over a copy of what a
-    simulator goes on changing.
+    Build it with `Fleet.of` from plain arrays, or pass simulator state rows directly. Arrays of the right type and
+    layout are stored without a copy (others are converted), and decisions read them later: pass a copy of arrays that
+    a simulator goes on changing.
 
     Attributes:
-        state: (n, N_STATE) rows as in `platforms.layout`; autopilot memory may be NaN where it is not known.
+        state: (n, N_STATE) rows as in `platforms.layout`; autopilot memory may be NaN where it is unknown.
         team: (n,) team of each boat.
         platforms: names (or `Platform` objects) of the n boats.
         controlled: (n,) boats the shield decides for.
         names: names for messages and reports.
         age_s: (n,) age of each track, s; None: all fresh.
         position_error_m: (n,) bound on each position's error, m; None: as in the settings.
-        driven: (n, 4) of boats that something drives whose doing is known (a game, of tagged or disabled ones): speed
-            m/s, the place x, y m it steers at (NaN: none, the rudder is left alone) and the time, s, for which that is
-            sure to last; a row of NaN where nothing is known. None: of no boat. They are predicted as such, see
-            `barriers.neighbours`, unless they may be free before a backup ends, or are controlled.
+        driven: (n, 4) motion of boats that something predictable drives (a game, for tagged or disabled ones): speed
+            m/s, the point x, y m that it steers at (NaN: none, the rudder is left alone) and the time, s, for which
+            that is sure to last; a row of NaN where nothing is known. None: of no boat. Such boats are predicted
+            accordingly, see `barriers.neighbours`, unless they may be free before a backup ends, or are controlled.
         adversary_horizon_s: (n,) how long from now each may do its worst as an opponent before it holds its course, s;
-            NaN, or None for all: as the settings say; where `ShieldConfig.adversary_horizon_s` is 0 nobody is.
+            NaN, or None for all: as in the settings. If `ShieldConfig.adversary_horizon_s` is 0, nobody is adversarial.
         visiting: (n,) boats on the other team's side of a field, where they can tag nobody: adversarial for
-            `ShieldConfig.intruder_horizon_s`. None: of none it is known.
+            `ShieldConfig.intruder_horizon_s`. None: not known of any.
 
     Raises:
-        FleetError: shapes do not fit together, or an entry is of another kind. Values are looked at by `check`.
+        FleetError: shapes do not fit together, or an entry is of another kind. `check` checks the values.
     """
 
     state: Array
@@ -121,7 +121,7 @@ class Fleet:
         adversary_horizon_s: ArrayLike | None = None,
         visiting: ArrayLike | None = None,
     ) -> Fleet:
-        """Fleet from plain arrays, one entry per boat, which are copied.
+        """Build a fleet from plain arrays, one entry per boat, which are copied.
 
         Args:
             position_m: (n, 2) east and north, m, within 1e9 of the origin.
@@ -132,12 +132,12 @@ class Fleet:
             platforms: one platform for all, or n of them.
             controlled: True and False; None: the boats of team 0.
             names: n names; None: boat_0, boat_1, ...
-            thrust: percent where known, at most the platform's ``max_thrust`` either way, else NaN: of own boats it is
-                then followed from what was sent; at first, and of others, it is taken from the speed.
+            thrust: percent where known, at most the platform's ``max_thrust`` either way, else NaN. Unknown thrust of
+                own boats is then estimated from the commands sent; at first, and for others, from the speed.
             age_s: age of each track, s, 0 to 3600; more than `ShieldConfig.max_track_age_s` is refused later.
             position_error_m: bound on the position error, m, 0 to 1000.
-            adversary_horizon_s: as of `Fleet`, s, 0 to inf.
-            visiting: as of `Fleet`.
+            adversary_horizon_s: as in `Fleet`, s, 0 to inf.
+            visiting: as in `Fleet`.
 
         Raises:
             FleetError: shapes do not fit together, a value cannot be used or is out of its range, two boats have the
@@ -186,7 +186,7 @@ class Fleet:
         """Check values, which may have changed since the fleet was built.
 
         Raises:
-            FleetError: a position, heading or speed is not finite or absurd, or an age or an error bound is none.
+            FleetError: a position, heading or speed is not finite or absurd, or an age or an error bound is invalid.
         """
         if not sound(self.state):
             for column, values in enumerate(self.state.T):
@@ -201,7 +201,7 @@ class Fleet:
             self._check("adversary_horizon_s", times_s, 0.0, np.inf, remedy)
 
     def _check(self, name: str, values: Array | None, low: Any, high: Any, remedy: str) -> None:
-        """Raise for the first boat whose value is not within its range; {} in the remedy is the highest value."""
+        """Raise for the first boat whose value is out of its range; {} in the remedy is the highest value."""
         if values is None:
             return
         bad = ~((values >= low) & (values <= high))
@@ -236,7 +236,7 @@ _COLUMNS: dict[str, Any] = {
     "adversary_horizon_s": (numbers,),
     "visiting": (truths,),
 }
-"""What brings each array to the type of compiled code, and the shape of a boat's row in it."""
+"""Function that converts each array to the type of compiled code, and the shape of a boat's row."""
 
 _LAST = "of a boat that drops out the last fix with its age_s, and leave out boats that never had one"
 _PLACE = ("position", LARGEST, f"give m from a place nearby; {_LAST}")
@@ -247,7 +247,7 @@ _SEEN = {
     L.SPEED: ("speed", LARGEST_SPEED_MPS, f"give m/s up to {{:g}} either way, not mm/s or cm/s; {_LAST}"),
 }
 _MEMORY = ("memory", LARGEST, "give NaN where it is unknown")
-"""What a column of the state is, the most that it may hold, and the remedy."""
+"""Name of a column of the state, its largest value, and the remedy."""
 
 _IF_DEGREES = (
     "if these are degrees, give metres east and north of a place nearby: steerclear.shield.bridge.frame.FieldFrame("
@@ -262,7 +262,7 @@ def _each(name: str, value: Any) -> tuple[Any, ...]:
 
 
 def _known(platforms: Any) -> tuple[str | Platform, ...]:
-    """Platforms, each a known one; those named by a file are read."""
+    """Return platforms, each a known one; those named by a file are read."""
     kinds = _each("platforms", platforms)
     for kind in kinds:
         if not isinstance(kind, (str, Platform)):
@@ -272,14 +272,14 @@ def _known(platforms: Any) -> tuple[str | Platform, ...]:
 
 
 def _own(name: str, value: Any, n: int) -> Any:
-    """A copy of an array with an entry per boat, of its type; None is none."""
+    """Return a copy of an array with an entry per boat, of its type; None for None."""
     return None if value is None else shaped(name, value, (n,), _COLUMNS[name][0]).copy()
 
 
 def _check_given(fleet: Fleet) -> None:
-    """Check what a person gave: numbers that compiled code would take, but that say nothing, or are of other units.
+    """Check what a person gave: reject numbers that compiled code takes, but that mean nothing or are in other units.
 
-    Of fleets that programs build these are not refused: a boat at sea is better kept clear of as well as may be.
+    Fleets that programs build are not checked so: the shield should avoid a boat at sea as well as it can.
     """
     remedy = "give a bound in m from 0 to {:g}, not in mm; leave out boats whose place is not known"
     fleet._check("position_error_m", fleet.position_error_m, 0.0, LARGEST_ERROR_M, remedy)

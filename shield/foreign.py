@@ -1,4 +1,4 @@
-"""What comes from outside: other packages' entry points, and text made fit to be shown."""
+"""Things from outside: other packages' entry points, and text made safe to display."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ LOG = logging.getLogger(__name__)
 
 @cache
 def load_others(group: str, register: Callable[[Any], Any] | None = None) -> None:
-    """Load what entry points of a group name, once in a process; a module registers what it has itself.
+    """Load what the entry points of a group name, once per process; a module registers its contents itself.
 
     Args:
-        group: of the entry points; its last word names what they bring.
-        register: takes what is no module; None: nothing is to be done with it.
+        group: of the entry points; its last word names what they provide.
+        register: called with what is not a module; None: it is ignored.
     """
     for point in entry_points(group=group):
         try:
@@ -34,14 +34,14 @@ def load_others(group: str, register: Callable[[Any], Any] | None = None) -> Non
 
 
 _HIDDEN = ("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp")
-"""Kinds of characters that draw nothing: control and format (which also turn the direction of what follows), halves of
-pairs, private and unassigned ones, separators of lines and paragraphs."""
+"""Unicode categories that draw nothing: control and format (which can reverse the text that follows), surrogates,
+private and unassigned ones, separators of lines and paragraphs."""
 
 
 def visible(text: object, keep: str = "") -> str:
-    """Write every character that would be obeyed rather than drawn as its code.
+    """Write every character that would act rather than be drawn as its code.
 
-    A terminal obeys backup sequences; both it and a browser turn what follows a mark of direction round.
+    A terminal obeys escape sequences; terminals and browsers reverse the text after a direction mark.
 
     Args:
         text: anything; its ``str`` is shown.
@@ -54,7 +54,7 @@ def visible(text: object, keep: str = "") -> str:
 
 
 def is_drawn(letter: str) -> bool:
-    """Whether a character is drawn, a space among them."""
+    """Return whether a character is drawn, including a space."""
     return unicodedata.category(letter) not in _HIDDEN
 
 
@@ -63,11 +63,11 @@ def _code(number: int) -> str:
 
 
 def plain_text(text: object, most: int = 300, lines: bool = False) -> str:
-    """Text without what a terminal obeys: characters that cannot be printed become ``?``, white space one blank.
+    """Return text that is safe on a terminal: unprintable characters become ``?``, white space one blank.
 
     Args:
         text: what is shown.
-        most: characters of it at most.
+        most: largest number of characters.
         lines: keep line ends.
     """
     kept = str(text)[: 8 * most]
@@ -84,9 +84,9 @@ _LIBRARIES = (os.path.join("lib", "python"), f"{os.sep}site-packages{os.sep}", "
 
 
 def describe_error(error: BaseException) -> str:
-    """Type, text and place of an error raised by foreign code, in one line that a terminal can be shown.
+    """Return type, text and place of an error raised by foreign code, in one line that is safe on a terminal.
 
-    The place is the last line of theirs that was running; where a library or we raised, that is named after it.
+    The place is the last line of foreign code that ran. If a library or this package raised, that place follows.
     """
     try:
         text = plain_text(error)

@@ -1,7 +1,7 @@
-"""The one way compiled functions are made here.
+"""The one way to compile functions here.
 
-Machine code is made of what Python calls with all that calls, see `whole_program`, and kept on disk. Fast-math stays
-off: results must be the same bits everywhere, and NaN tests must work.
+Machine code is made of each function that Python calls, with everything it calls, see `whole_program`, and stored on
+disk. Fast-math stays off: results must be the same bits everywhere, and NaN tests must work.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
 COMPILE_NOTHING = ("shield/bridge", "shield/wrappers", "env/render", "policies/submissions", "policies/entrants")
-"""Folders that hold no compiled function, nor anything that one uses: changes there leave machine code as it is."""
+"""Folders without compiled functions, or anything that these use: changes there do not recompile."""
 
 
 def kernel(function: F) -> F:
@@ -40,7 +40,7 @@ def kernel(function: F) -> F:
 
 
 def lean_kernel(function: F) -> F:
-    """The same for a function that makes no array: those it is handed stay its caller's, and are not counted."""
+    """Compile a function that makes no arrays: its arguments stay the caller's and are not reference-counted."""
     return _compiled(function, counted=False)
 
 
@@ -58,7 +58,7 @@ def _compiled(function: F, counted: bool) -> F:
 
 @cache
 def _whole_program() -> Any:
-    """The module of that name; None where this numba differs from the one that it is written for."""
+    """Return the module `whole_program`; None if this numba differs from the one it is written for."""
     try:
         from . import whole_program
 
@@ -75,15 +75,15 @@ ROOT = Path(__file__).parent.parent
 
 
 def _beside(file: str) -> Path | None:
-    """The folder whose sources a function of that file may hang on besides those of the shield; None: none."""
+    """Return the folder whose sources a function of that file may depend on besides the shield's; None: none."""
     if Path(file).is_relative_to(ROOT / "experiments"):
         return ROOT / "experiments"
-    return None if Path(file).is_relative_to(ROOT) else Path(file).parent  # somebody's barrier
+    return None if Path(file).is_relative_to(ROOT) else Path(file).parent  # a user's barrier
 
 
 @cache
 def _stamp(beside: Path | None) -> str:
-    """Digest of all that machine code may hang on, as it is at import: sources, those beside, numba, the machine."""
+    """Return a digest of all that machine code may depend on, at import: sources, ``beside``, numba, the machine."""
     digest = hashlib.sha256(f"{numba.__version__} {sys.version}".encode())
     paths = {path for name in ("shield", "env", "policies") for path in (ROOT / name).rglob("*.py")}
     paths = {path for path in paths if not path.relative_to(ROOT).as_posix().startswith(COMPILE_NOTHING)}
@@ -91,14 +91,14 @@ def _stamp(beside: Path | None) -> str:
         name = path.relative_to(ROOT) if path.is_relative_to(ROOT) else path
         try:
             digest.update(str(name).encode() + path.read_bytes())
-        except OSError:  # nobody knows whether it changes: nothing kept is found again
+        except OSError:  # it may change unseen: no stored code is found again
             digest.update(os.urandom(16))
     return digest.hexdigest()
 
 
 @cache
 def kept_in() -> Path | None:
-    """Where machine code is kept; None: nowhere."""
+    """Return the folder where machine code is stored; None: nowhere."""
     given = getattr(config, "CACHE_DIR", "")
     home = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "steerclear"
     for place in [Path(given)] if given else [Path(__file__).parent / "__pycache__", home]:
@@ -113,7 +113,7 @@ def kept_in() -> Path | None:
 
 
 class _Kept(NullCache):
-    """Machine code on disk, a sealed file each; never a reason to stop."""
+    """Machine code on disk, one checksummed file each; failures never stop the program."""
 
     def __init__(self, name: str, file: str) -> None:
         self._name, self._stamp = name, _stamp(_beside(file))
@@ -124,7 +124,7 @@ class _Kept(NullCache):
         return None if place is None else place / f"{self._name}.{hashlib.sha256(about.encode()).hexdigest()[:32]}.code"
 
     def load_overload(self, args: Any, context: Any) -> Any:
-        """The code for some arguments; None where there is none."""
+        """Return the code for some arguments; None if there is none."""
         try:
             path = self._path(args, context)
             sealed = b"" if path is None else path.read_bytes()
@@ -135,19 +135,19 @@ class _Kept(NullCache):
                 _say(f"compiled code in {path.parent} cannot be read, it is made anew")
         except FileNotFoundError:
             _say("steerclear compiles its machine code, once: about a minute (steerclear warm-up does it beforehand)")
-        except Exception as error:  # what damage leads to is anything
+        except Exception as error:  # damaged files may raise anything
             _say(f"compiled code cannot be read, it is made anew ({error!r})")
         return None
 
     def save_overload(self, args: Any, made: Any) -> None:
-        """Keep it; written beside and put in place at once."""
+        """Store code: written to a temporary file, then moved into place at once."""
         try:
             path, content = self._path(args, made.target_context), dumps(made._reduce())
             if path is not None:
                 with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
                     file.write(hashlib.sha256(content).digest() + content)
                 os.replace(file.name, path)
-        except Exception as error:  # the code itself is there and right
+        except Exception as error:  # the code itself is valid
             _say(f"compiled code cannot be kept ({error!r}): a minute at every start")
 
 

@@ -1,11 +1,11 @@
-"""Masks of actions: which candidate commands a shield would let pass as they are, in this step.
+"""Action masks: which candidate commands the shield would pass unchanged in this step.
 
-A candidate of a boat passes where the boat, one step after it, still satisfies everything on its backup, while its
-teammates go straight on. It is the nominal check of that boat alone: neighbours, required margins and the backup are
-found once for all candidates, and candidates that lead to the same state are checked once.
+A candidate of a boat passes if the boat, one step after it, satisfies everything on its backup while its teammates go
+straight on. This is the nominal check of that boat alone. Neighbours, required margins and the backup are found once
+for all candidates, and candidates that lead to the same state are checked once.
 
-A mask says what passes now; it says nothing of later steps, nor of teammates' candidates. The shield stays behind it,
-and is what keeps boats apart.
+A mask covers this step only, not later ones, nor teammates' candidates. Boats stay apart because the shield still
+filters the chosen command.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ from .platforms import layout as L
 from .workspace import LARGEST_COMMAND, PASSED, Scene, Static
 
 SHORT_OF_ALL = Rank(OPPONENTS, -FAR)
-"""Manoeuvres are rated only as far as it takes to tell whether they satisfy everything."""
+"""Manoeuvres are scored only as far as needed to decide whether they satisfy everything."""
 
 
 @lean_kernel
 def _begin(b: int, scene: Scene) -> None:
-    """Find what all candidates of a decision share: neighbours, required margins, and backups of boats that go on."""
+    """Find what all candidates of a decision share: neighbours, required margins, backups of boats going straight."""
     for i in range(scene.ours.shape[0]):
         if scene.ours[i]:
             scene.nominal[i, 0], scene.nominal[i, 1] = scene.state[i, L.SPEED], 0.0
@@ -47,7 +47,7 @@ def _begin(b: int, scene: Scene) -> None:
 
 @lean_kernel
 def _goes_out(i: int, b: int, asked: Array, scene: Scene) -> bool:
-    """Make a candidate boat i's command; whether the shield would check it as it is."""
+    """Make a candidate boat i's command; return whether the shield would check it unmodified."""
     if not (abs(asked[0]) <= LARGEST_COMMAND and abs(asked[1]) <= LARGEST_COMMAND):
         return False
     turned = scene.state[i, L.HEADING] - scene.given[b, i, L.HEADING]  # until the command takes effect
@@ -60,10 +60,10 @@ def _goes_out(i: int, b: int, asked: Array, scene: Scene) -> bool:
 
 @lean_kernel
 def _same_from_here(i: int, other: Array, scene: Scene) -> bool:
-    """Whether boat i's manoeuvres are the same from its predicted state as from another.
+    """Return whether boat i's manoeuvres are the same from its predicted state as from another.
 
-    Those of thrust boats do not hang on the memory of their steering. Within a step of several moves boats may be
-    elsewhere, also where they end at the same place.
+    Manoeuvres of thrust boats do not depend on the memory of their steering. In a step of several moves, boats that
+    end at the same place may have been elsewhere in between.
     """
     row, params = scene.next_state[i], scene.boats.params[i]
     plain = params[L.KIND] == L.KIND_USV and params[L.ROTATE_SPEED] == 0.0
@@ -79,7 +79,7 @@ def _same_from_here(i: int, other: Array, scene: Scene) -> bool:
 
 @lean_kernel
 def _has_backup(i: int, scene: Scene) -> bool:
-    """Whether boat i satisfies everything on the backup it holds from its predicted state, or on one found now."""
+    """Return whether boat i satisfies everything on its held backup from its predicted state, or on one found now."""
     trial, held = scene.state.shape[0], scene.held
     togo_deg = found_turn(i, scene.next_state[i, L.HEADING], held)
     roll_out(i, trial, held[i, 0], togo_deg, held[i, 2], 1, scene)
@@ -99,7 +99,7 @@ def _passing(i: int, b: int, candidates: Array, states: Array, passes: BoolArray
     scene.searched[i] = -1
     stopped = beyond_line(i, scene) or unknown_at(i, scene) >= 0
     for k in range(candidates.shape[0]):
-        states[k, L.X] = np.nan  # like no other, as long as nothing is predicted
+        states[k, L.X] = np.nan  # equals no state, while nothing is predicted
         passes[k] = not stopped and _goes_out(i, b, candidates[k], scene)
         if not passes[k]:
             continue
@@ -109,7 +109,7 @@ def _passing(i: int, b: int, candidates: Array, states: Array, passes: BoolArray
             alike += 1
         copy_row(states[k], scene.next_state[i])
         passes[k] = passes[alike] if alike < k else _has_backup(i, scene)
-    if scene.searched[i] > 0:  # teammates are rated beside it as it goes on
+    if scene.searched[i] > 0:  # teammates are scored beside it as it goes straight on
         scene.command[i, 0], scene.command[i, 1] = scene.state[i, L.SPEED], 0.0
         predict(i, scene.command, scene)
         togo_deg = found_turn(i, scene.next_state[i, L.HEADING], scene.held)
@@ -118,7 +118,7 @@ def _passing(i: int, b: int, candidates: Array, states: Array, passes: BoolArray
 
 @kernel
 def _pass_all(scene: Scene, candidates: Array, passes: BoolArray) -> None:
-    """Write which candidates (B, n, k, 2) pass, (B, n, k); all do of boats that are not decided for."""
+    """Write which candidates (B, n, k, 2) pass, (B, n, k); those of boats not decided for all do."""
     states = np.empty((candidates.shape[2], L.N_STATE))
     for b in range(candidates.shape[0]):
         load_decision(b, scene)
@@ -130,10 +130,10 @@ def _pass_all(scene: Scene, candidates: Array, passes: BoolArray) -> None:
 
 
 def passing(deciders: Deciders, static: Static, candidates: Array) -> BoolArray:
-    """Which of k candidates (B, n, k, 2), m/s and relative heading deg, pass, (B, n, k); nothing is remembered of it.
+    """Return which of k candidates (B, n, k, 2), m/s and relative heading deg, pass, (B, n, k); nothing is remembered.
 
     Args:
-        deciders: to whom all but the commands is given.
+        deciders: deciders to which everything but the commands is given.
         static: static constraints.
         candidates: each boat's own.
     """

@@ -1,4 +1,4 @@
-"""From settings and platforms to the constant arrays of a scene."""
+"""The constant arrays of a scene, from settings and platforms."""
 
 from __future__ import annotations
 
@@ -27,31 +27,32 @@ from .workspace import Boats, Tuning
 _LOG = logging.getLogger(__name__)
 
 FADE = 4.0
-"""A negative margin against a pursuer at the end of the time it is followed counts exp(-FADE) of one now."""
+"""A negative margin from a pursuer counts exp(-FADE) of its present weight at the end of the pursuit."""
 
 JOINT_RUN_S = 3.0
-"""Time over which several opponents of a boat are run through before they are looked up one by one, s.
+"""Time for which several opponents of a boat are rolled out before they are looked up one by one, s.
 
-With 5 s as few surveyors are hit by two and three rammers, but more commands are changed in games; with 8 s more are
-hit, since pursuers are less than the worst there is.
+With 5 s as few surveyors are hit by two and three rammers, but more commands are changed in games. With 8 s more are
+hit, since rolled-out pursuers are not the worst case.
 """
 
 CHASE_S = 30.0
-"""Time over which opponents no faster than a boat are followed as pursuers, s.
+"""Time for which opponents no faster than a boat are followed as pursuers, s.
 
-On the boat's quarter they close in for so long on an all but parallel course: of herons two such leave less room than
-either. Of faster ones a run that long says that all is lost, which it is not.
+On the boat's quarter they close in for that long on a nearly parallel course: two such herons leave less room than
+either. A rollout that long of faster opponents would report that no manoeuvre is left, which is not so.
 """
 
 STATIC_REACTION_S = 0.5
-"""Time beyond a half turn over which static constraints are looked at, s."""
+"""Time beyond a half turn for which static constraints are checked, s."""
 
 
 def tuning_of(config: ShieldConfig) -> Tuning:
-    """Scalar settings for compiled code.
+    """Return the scalar settings for compiled code.
 
-    What teammates will do is known where one program decides for all, and sees and steers them as they are; not where
-    nothing is feared of opponents but that they hold their course: their margin is one with it.
+    Margins from teammates may have a cap of their own only where their motion is known. That is where one decision
+    covers all boats and sees and steers them exactly. It does not apply where opponents are only taken to hold their
+    course: their margin is then one with that from teammates.
     """
     exact = config.position_error_m == 0.0 and config.delay_s == 0.0 and config.current_mps == 0.0
     known = config.coordination == "team" and exact and config.effective_adversary_horizon_s > 0.0
@@ -80,7 +81,7 @@ def tuning_of(config: ShieldConfig) -> Tuning:
 
 @lru_cache(maxsize=256)
 def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: tuple[int, ...]) -> Boats:
-    """Constants of the boats of a fleet.
+    """Return the constants of the boats of a fleet.
 
     Raises:
         PlatformError: a platform is unknown.
@@ -131,7 +132,7 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
 
 @lru_cache(maxsize=256)
 def missing_tables(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: tuple[int, ...]) -> BoolArray:
-    """Pairs (own boat, opponent), (n, n), that a value table should answer for and none does; the log says why."""
+    """Return the pairs (own boat, opponent), (n, n), for which a value table is missing; the log says why."""
     sides, kinds = np.array(team), [get_platform(name) for name in platforms]
     uses = np.array([_uses_table(config, kind) for kind in kinds], dtype=np.bool_)
     found: BoolArray = boats_of(config, platforms, team).table >= 0
@@ -142,7 +143,7 @@ def missing_tables(config: ShieldConfig, platforms: tuple[str | Platform, ...], 
 def _horizons(
     config: ShieldConfig, kinds: tuple[Platform, ...], limits: list[Limits], team: tuple[int, ...], sample_s: float
 ) -> dict[str, Any]:
-    """How many samples each boat's paths, pursuers and static constraints are followed for."""
+    """Return for how many samples each boat's paths, pursuers and static constraints are followed."""
     certificate, pursuers = CERTIFICATES[config.opponent_model], config.effective_adversary_horizon_s > 0.0
     horizon_s = [config.horizon_s or certificate.horizon_s(kind, config.model_s) for kind in kinds]
     pursuit_s, thrust_s, chase_s = list(horizon_s), [0.0] * len(kinds), [0.0] * len(kinds)
@@ -172,9 +173,9 @@ def _samples(times_s: list[float], sample_s: float, least: int) -> IntArray:
 def _tables_of(
     config: ShieldConfig, kinds: tuple[Platform, ...], team: tuple[int, ...]
 ) -> tuple[Tables, IntArray, int]:
-    """Value tables, which holds for each pair of own boat and opponent, and model steps of one table step.
+    """Return the value tables, the table of each pair of own boat and opponent, and the model steps of one table step.
 
-    Pairs without one (-1) are run through instead, as are all where the own boat looks none up.
+    Opponents of pairs without a table (-1) are rolled out instead, as are all opponents of boats that look none up.
     """
     which = np.full((len(kinds), len(kinds)), -1, dtype=np.int64)
     found: dict[tuple[Platform, Platform], int] = {}
@@ -195,7 +196,7 @@ def _tables_of(
 
 
 def _uses_table(config: ShieldConfig, kind: Platform) -> bool:
-    """Whether a boat looks opponents up where there is a table; there is none for boats that turn by a rate loop."""
+    """Return whether a boat looks opponents up where there is a table; none exists for boats with a rate loop."""
     if config.effective_adversary_horizon_s <= 0.0 or kind.kind == "rate":
         return False
     return CERTIFICATES[config.opponent_model].uses_table(limits_of(kind, config.model_s))
@@ -203,7 +204,7 @@ def _uses_table(config: ShieldConfig, kind: Platform) -> bool:
 
 @lru_cache(maxsize=64)
 def _table_or_none(own: Platform, other: Platform) -> ValueTable | None:
-    """The table of a pair; without a usable one its opponents are run through as pursuers, which the log says once."""
+    """Return the table of a pair, or None if there is no usable one, which is logged once."""
     try:
         return load_table(own, other, OtherMay.WORST_CASE)
     except TableError as error:
@@ -214,7 +215,7 @@ def _table_or_none(own: Platform, other: Platform) -> ValueTable | None:
 def _manoeuvres_of(
     certificate: Certificate, kinds: tuple[Platform, ...], with_table: BoolArray
 ) -> tuple[Array, IntArray]:
-    """`Boats.manoeuvres` and `Boats.n_manoeuvres`."""
+    """Return `Boats.manoeuvres` and `Boats.n_manoeuvres`."""
     families = [certificate.manoeuvres(*boat) for boat in zip(kinds, with_table, strict=True)]
     manoeuvres = np.full((len(kinds), max((len(family) for family in families), default=0), 3), np.nan)
     for rows, family in zip(manoeuvres, families, strict=True):
@@ -223,23 +224,23 @@ def _manoeuvres_of(
 
 
 def _decay(cbf_rate_per_s: float, config: ShieldConfig) -> float:
-    """Factor by which a margin may shrink in one step."""
+    """Return the factor by which a margin may shrink in one step."""
     return 0.0 if math.isinf(cbf_rate_per_s) else math.exp(-cbf_rate_per_s * config.dt_s)
 
 
 def _table_cap_m(config: ShieldConfig, tables: Tables) -> float:
-    """Margins above this may shrink freely, m: no more than the tables can tell beyond the distance that is kept."""
+    """Return the margin above which it may shrink freely, m: at most what tables cover beyond the required distance."""
     kept_m = config.separation_m + config.buffer_m + 2.0 * config.position_error_m + config.table_margin_m
     known_m = min((float(axes[CAP]) for axes in tables.axes), default=math.inf)
     return max(0.0, min(config.margin_cap_m, known_m - kept_m))
 
 
 def _stride(kind: Platform, limit: Limits, dt_s: float) -> int:
-    """Model steps between path samples: the chord between two may cut its arc, v w t^2 / 8 deep, by `SAG_M`."""
+    """Return model steps between path samples: the chord may cut the arc, v w t^2 / 8 deep, by `SAG_M`."""
     bend = kind.fastest_mps(dt_s) * math.radians(limit.turn_rate_dps)
     return int(math.sqrt(8.0 * SAG_M / bend) / dt_s + 1e-9) if bend > 0.0 else 1
 
 
 def _lasting_loss(limit: Limits) -> float:
-    """Share of top speed lost in a turn, as far as it is not regained at once when the turn ends."""
+    """Return the share of top speed lost in a turn, less what is regained at once when the turn ends."""
     return limit.turn_loss * min(1.0, limit.turn_deceleration_mps2 / max(limit.acceleration_mps2, 1e-6))

@@ -1,4 +1,4 @@
-"""Public names of 0.8: each still works for one release, and warns with the name that took its place."""
+"""Public names of 0.8: each still works for one release and warns with its new name."""
 
 from __future__ import annotations
 
@@ -51,11 +51,11 @@ LOG = logging.getLogger(__name__)
 
 
 def current_settings(settings: Mapping[str, Any], warned: bool = False) -> dict[str, Any]:
-    """Settings of the shield as an earlier version wrote them, under the names of this one; others stay as they are.
+    """Return settings of an earlier version under their present names; others stay as they are.
 
     Args:
         settings: by name.
-        warned: whether whoever wrote an old name is there to be told.
+        warned: whether to log a warning for each old name.
     """
     renamed = {}
     for name, value in settings.items():
@@ -68,7 +68,7 @@ def current_settings(settings: Mapping[str, Any], warned: bool = False) -> dict[
 
 
 def warn(old: str, new: str, stacklevel: int = 3) -> None:
-    """Say that a name goes, and what took its place."""
+    """Warn that a name is deprecated, with its new name."""
     text = f"{old!r} is now {new!r}; the old name goes with the next release"
     warnings.warn(text, DeprecationWarning, stacklevel=stacklevel + 1)
 
@@ -77,15 +77,15 @@ def accepts_old_names(keywords: Mapping[str, str], attributes: Mapping[str, str]
     """Let a class be built with, and read by, its old names as well; each use warns.
 
     Args:
-        keywords: keywords of its constructor, and of its classmethod ``of`` where it has one, old name to new.
-        attributes: what else can be read by an old name.
+        keywords: keywords of its constructor, and of its classmethod ``of`` if it has one, old name to new.
+        attributes: other attributes with an old name.
     """
     readable = {**keywords, **(attributes or {})}
 
     def renaming(build: Callable[..., Any]) -> Callable[..., Any]:
         @functools.wraps(build)
         def called(*args: Any, **given: Any) -> Any:
-            if not keywords.keys().isdisjoint(given):  # hardly ever, and decisions are made by the thousand
+            if not keywords.keys().isdisjoint(given):  # rare, and decisions are made by the thousand
                 for old in [name for name in given if name in keywords]:
                     warn(old, keywords[old])
                     given[keywords[old]] = given.pop(old)

@@ -1,9 +1,9 @@
 """Named tuples of arrays that compiled code reads through their address.
 
-numba hands a named tuple to a function field by field: for the tuples of a decision some six hundred numbers at every
-call. A shared tuple is one address of eight-byte words; its fields read the same, in Python and in compiled functions.
-They hold no references: whoever hands a shared tuple to compiled code keeps it alive meanwhile, and no compiled
-function returns an array of one.
+numba passes a named tuple to a function field by field: for the tuples of a decision some six hundred numbers per
+call. A shared tuple is one address of eight-byte words. Its fields read the same in Python and in compiled functions.
+The words hold no references: the caller must keep a shared tuple alive while compiled code uses it, and no compiled
+function may return an array of one.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Shared:
         raise AttributeError(f"{name} of a shared tuple stays what it is; write into its array")
 
     def __getattr__(self, name: str) -> Any:
-        if "_tuple" not in self.__dict__:  # asked for before there is one
+        if "_tuple" not in self.__dict__:  # read before it is set
             raise AttributeError(name)
         return getattr(self._tuple, name)
 
@@ -50,16 +50,16 @@ class Shared:
         return iter(self._tuple)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Shared, (self._tuple,)  # a copy has an address of its own
+        return Shared, (self._tuple,)  # a copy gets its own address
 
 
 def share(row: Row) -> Row:
-    """A `Shared` tuple of arrays, float64, int64, bool and tuples of them; others are a TypeError."""
+    """Return a `Shared` tuple of arrays, float64, int64, bool and tuples of them; others are a TypeError."""
     return cast(Row, Shared(row))
 
 
 def type_of(row: Any) -> SharedType:
-    """Numba's type of a shared tuple."""
+    """Return numba's type of a shared tuple."""
     kind: SharedType = row._type
     return kind
 
@@ -77,7 +77,7 @@ _TYPES: dict[Any, SharedType] = {}
 
 
 def _words(value: Any) -> tuple[Any, list[int]]:
-    """Numba's type of a field and the words it takes; an array's as numba has them, without an owner."""
+    """Return numba's type of a field and the words it takes; an array's as in numba, without an owner."""
     if isinstance(value, Shared):
         return value._type, [value._address]
     if isinstance(value, np.ndarray):
@@ -121,5 +121,5 @@ def _read_field(context: Any, builder: Any, of: SharedType, pointer: Any, name: 
     kind, place = of.fields[name]
     word = builder.gep(pointer, [ir.Constant(WORD, place)], inbounds=True)
     value = builder.load(builder.bitcast(word, context.get_value_type(kind).as_pointer()))
-    value.set_metadata("invariant.load", builder.module.add_metadata([]))  # fields stay what they are
+    value.set_metadata("invariant.load", builder.module.add_metadata([]))  # fields never change
     return impl_ret_borrowed(context, builder, kind, value)

@@ -1,4 +1,4 @@
-"""`Shield`: the fleet and the nominal commands in, safe commands out."""
+"""`Shield`: takes the fleet and the nominal commands, returns filtered commands."""
 
 from __future__ import annotations
 
@@ -39,17 +39,19 @@ NOMINAL = slice(W.NOMINAL_SPEED, W.NOMINAL_TURN + 1)
 class Shield:
     """Filters commanded heading and speed so that boats keep their distance.
 
-    Every step, `decide` sends a nominal command on unchanged when every boat still has a backup after it (and no two
-    teammates have kept each other from turning for seconds, see `right_of_way`). Among teammates it is otherwise the
-    least change that keeps one,
+    In each step, `decide` passes a nominal command unchanged if every boat still has a backup after it (and no two
+    teammates have kept each other from turning for seconds, see `right_of_way`). Otherwise, among teammates, it sends
+    the least change that leaves every boat a backup,
 
-        minimise |u - u_wanted|^2   subject to   h(x+) >= exp(-alpha dt) h(x)   for every pair, edge and obstacle,
+        minimise |u - u_nominal|^2   subject to   h(x+) >= exp(-alpha dt) h(x)   for every pair, edge and obstacle,
 
-    with u the turn and speed of this step, chosen through the autopilot; against opponents the backup, and along edges
-    as little of it as will do. What it remembers between calls is the backup of each boat, its margins and the commands
-    on their way, for as long as the boat (name, platform, team) is in the fleet; the same sequence of inputs from
-    `reset` on gives the same bits. It takes one call per step of the settings, and boats that do what was sent. It
-    decides for one thread at a time: compiled code works on its arrays without the GIL.
+    where u is the turn and speed of this step, commanded through the autopilot. Against opponents it sends the backup;
+    along edges, as little of the backup as suffices.
+
+    Between calls it remembers each boat's backup, its margins and the commands not yet in effect, for as long as the
+    boat (name, platform, team) is in the fleet. The same inputs since `reset` give the same bits. It expects one call
+    per step of the settings, and boats that follow their commands. It serves one thread at a time: compiled code works
+    on its arrays without the GIL.
 
     Args:
         config: settings; None takes the defaults.
@@ -57,7 +59,7 @@ class Shield:
         **settings: single settings by name, instead of ``config``.
 
     Attributes:
-        serves: whom it has decided for since `reset`, where wrappers use it; None: nobody yet.
+        serves: whom wrappers have used it for since `reset`; None: nobody yet.
 
     Raises:
         ConfigError: a setting is unknown or out of range, or leaves nothing of the field.
@@ -76,7 +78,7 @@ class Shield:
         self.surroundings = surroundings
         self._barriers = barriers_of(self.config)
         self._packed: tuple[Surroundings, Static] | None = None
-        self._static(surroundings)  # one that does not fit the settings is refused here, not in a loop
+        self._static(surroundings)  # surroundings that do not fit the settings are refused here, not in a loop
         self._kept_from: Static | None = None
         self._deciders: Deciders | None = None
         self._known: tuple[Any, ...] | None = None
@@ -84,18 +86,18 @@ class Shield:
         self._highest_mps, self._bound = (
             np.zeros(0),
             np.zeros(0, np.int64),
-        )  # of boats, and of what binds, in their order
+        )  # of boats, and of active constraints, in their order
         self._autopilots: Autopilots | None = None
         self.serves: object | None = None
 
     @classmethod
     def for_game(cls, game: Any, **settings: Any) -> Shield:
-        """The shield for a game, with its step and its distances: where it counts collisions, and how wide boats are.
+        """Build the shield for a game, with the game's step, its collision distance and the width of its boats.
 
         Args:
-            game: an `MctfEnv`, a ``PyQuaticusEnv``, a PettingZoo wrapper around one, or a `BatchedMctf` (of which it
-                decides for one game at a time; `games_shield` builds the shield for all).
-            **settings: settings that are to be other than the game's, or than the default.
+            game: an `MctfEnv`, a ``PyQuaticusEnv``, a PettingZoo wrapper around one, or a `BatchedMctf` (for one game
+                of it at a time; `games_shield` builds the shield for all).
+            **settings: settings that differ from the game's, or from the default.
 
         Raises:
             ConfigError: a game that no shield can be built for, or an unusable setting.
@@ -108,9 +110,9 @@ class Shield:
         """Put this shield around a policy.
 
         Args:
-            policy: a team policy (``reset`` and ``act``, as `steerclear.policies.make` builds them), or any function of
-                what is seen to `Commands`.
-            read: for a function: turns what it sees into a `Fleet`.
+            policy: a team policy (``reset`` and ``act``, as `steerclear.policies.make` builds them), or any function
+                from observations to `Commands`.
+            read: for a function: turns its observations into a `Fleet`.
 
         Raises:
             ConfigError: the policy is neither, or ``read`` is missing.
@@ -125,19 +127,19 @@ class Shield:
         self.serves = None
 
     def warm_up(self, fleet: Fleet | None = None) -> None:
-        """Compile what decisions run, so that the first one is as quick as any; the shield's memory is left alone.
+        """Compile what decisions run, so that the first one is as fast as any; the shield's memory stays as it is.
 
         Without it the first decision takes a minute the first time after an installation, and 0.1 s at every start.
 
         Args:
-            fleet: the boats to come, whose value tables are then read as well.
+            fleet: the boats to come, whose value tables are then also loaded.
 
         Raises:
             FleetError, PlatformError: boats that `decide` would refuse.
         """
         if fleet is not None and not isinstance(fleet, Fleet):
             raise FleetError(f"warm_up takes a Fleet, not {type(fleet).__name__}; build it with Fleet.of(...)")
-        for twin in (Shield(solver=self.config.solver), Shield(self.config)):  # by its settings there may be no room
+        for twin in (Shield(solver=self.config.solver), Shield(self.config)):  # its settings may leave no room
             twin.decide(*_tight_spot())
         if fleet is not None:
             fleet.check()
@@ -153,14 +155,14 @@ class Shield:
     ) -> Decisions:
         """Decide for all controlled boats of a fleet.
 
-        Manoeuvres are found one boat at a time, in the order of names: the same boats get the same commands, bit for
-        bit, in whatever order a fleet lists them.
+        Manoeuvres are found one boat at a time, in the order of names. So the same boats get the same commands, bit
+        for bit, in whatever order a fleet lists them.
 
         Args:
             fleet: all boats seen now.
-            nominal: what each boat is to do, n rows; rows of boats not controlled are passed through. Speeds beyond
-                what a boat's platform does are cut first (not those of `Commands.game_deg`).
-            surroundings: static constraints now, when they differ from the ones given at construction.
+            nominal: the nominal commands, n rows; rows of boats not controlled are passed through. Speeds beyond a
+                platform's range are cut first (not those of `Commands.game_deg`).
+            surroundings: static constraints now, if they differ from those given at construction.
             wanted: earlier name of ``nominal``; it warns, and goes with the next release.
 
         Returns:
@@ -175,7 +177,7 @@ class Shield:
         if wanted is not None:
             warn("wanted", "nominal")
             nominal = wanted
-        nominal = cast(Commands, nominal)  # whatever it is, `_check` looks
+        nominal = cast(Commands, nominal)  # `_check` refuses anything else
         around = self.surroundings if surroundings is None else surroundings
         _check(fleet, nominal, self.config)
         static = self._static(around)
@@ -219,25 +221,25 @@ class Shield:
 
     @property
     def remembered(self) -> dict[str, Array]:
-        """What goes on from decision to decision, by name: live arrays; empty before the first one."""
+        """Memory from decision to decision, by name: live arrays; empty before the first one."""
         return {} if self._deciders is None else self._deciders.remembered
 
     def safe_actions(
         self, fleet: Fleet, actions: Sequence[Commands], surroundings: Surroundings | None = None
     ) -> BoolArray:
-        """Which of k candidate commands would pass as they are in this step, (n, k); see `masks`.
+        """Return which of k candidate commands would pass unchanged in this step, (n, k); see `masks`.
 
-        Each boat's candidates are judged beside teammates that go straight on. It is for this step alone, and the
-        shield stays behind it. What the shield remembers is left alone.
+        Each boat's candidates are checked while its teammates go straight on. The mask is for this step alone, and the
+        shield must still filter the chosen command. The shield's memory stays as it is.
 
         Args:
             fleet: all boats seen now.
-            actions: k candidates, each a command of every boat, such as one for each action of a game.
-            surroundings: as of `decide`.
+            actions: k candidates, each a command for every boat, such as one for each action of a game.
+            surroundings: as for `decide`.
 
         Raises:
-            FleetError: no candidates, or as `decide`.
-            ConfigError: as `decide`.
+            FleetError: no candidates, or as for `decide`.
+            ConfigError: as for `decide`.
         """
         if isinstance(actions, Commands) or not len(actions):
             raise FleetError("actions are one Commands or none; give a list of them, one for each candidate")
@@ -258,7 +260,7 @@ class Shield:
             whole[:, k] = True if cut is None else ~cut
         believed = deepcopy(self._autopilots)
         state, unknown = self._with_memory(fleet, order)
-        self._autopilots = believed  # what is asked here is not sent: nothing goes on from it
+        self._autopilots = believed  # candidates are not sent: no estimate continues from them
         self._give(deciders.scene.given, fleet, fleet.state if unknown is None else state[place], actions[0], order)
         self._barriers.renew()
         each = np.repeat(candidates[order][np.newaxis], len(deciders.scene.given), axis=0)
@@ -268,7 +270,7 @@ class Shield:
         return passes[place] & whole
 
     def _deciders_of(self, fleet: Fleet, static: Static) -> Deciders:
-        """Deciders of a fleet; what is remembered of boats that stay is theirs in a new fleet."""
+        """Return the deciders of a fleet; the memory of boats that stay moves over to a new fleet."""
         known = _boats_in(fleet)
         if self._deciders is not None and self._known is not None and self._known[0] == known:
             return self._deciders
@@ -277,7 +279,7 @@ class Shield:
         keys = tuple(zip((fleet.names[i] for i in order), platforms, team, strict=True))
         boats = boats_of(self.config, platforms, team)
         self._missing = missing_tables(self.config, platforms, team)[np.ix_(place, place)]
-        self._missing.setflags(write=False)  # all decisions about these boats tell the same one
+        self._missing.setflags(write=False)  # decisions about these boats share it
         number = 1 if self.config.coordination == "team" else len(fleet)
         new = Deciders(self.config, number, boats, static, self._solver())
         believed, self._autopilots = self._autopilots, None
@@ -291,20 +293,20 @@ class Shield:
         self._highest_mps = boats.params[place, L.MAX_SPEED]
         self._bound = np.concatenate(
             [order, np.arange(STATIC - len(self.config.barriers), 0)]
-        )  # read from its end, too
+        )  # negative indices are used, too
         return new
 
     def _solver(self) -> Solver | None:
-        """What answers programs; None: the compiled solver. A method, so that programs can be looked at."""
+        """Return the QP solver; None: the compiled one. A method, so that tests can look at QPs."""
         return solver_of(self.config.solver)
 
     def _with_memory(self, fleet: Fleet, order: IntArray) -> tuple[Array, BoolArray | None]:
-        """States in order with what is believed of autopilots, and of whom; else as they are seen, and None."""
+        """Return states in order with estimated autopilot memory, and of whom; else the states as seen, and None."""
         if self._autopilots is None and all_known(fleet.state):
             return fleet.state, None
         state = fleet.state[order]
         unknown: BoolArray = fleet.controlled[order] & unknown_memory(state)
-        if fleet.age_s is not None:  # what was sent since is not in what is seen
+        if fleet.age_s is not None:  # an old track does not show the commands sent since
             unknown &= fleet.age_s[order] <= 0.5 * self.config.dt_s
         if not unknown.any():
             self._autopilots = None
@@ -315,7 +317,7 @@ class Shield:
         return state, unknown
 
     def _give(self, given: Array, fleet: Fleet, state: Array, within: Commands, order: IntArray) -> None:
-        """Write what is to be decided about, for the team, or for each boat.
+        """Write the inputs of the decision of the team, or of each boat's own decision.
 
         A boat that decides for itself knows its own nominal command and takes teammates to hold their course.
         """
@@ -334,27 +336,27 @@ class Shield:
                 given[0, :, column] = told[order]
         if self.config.coordination == "per_boat":
             given[1:] = given[0]
-            given[~fleet.controlled[order], :, W.OURS] = 0.0  # these decide nothing
+            given[~fleet.controlled[order], :, W.OURS] = 0.0  # their own decisions decide nothing
             given[:, :, W.NOMINAL_SPEED], given[:, :, W.NOMINAL_TURN] = given[:, :, L.SPEED], 0.0
             given[(*self._own_rows(len(fleet)), NOMINAL)] = nominal[order]
 
     def _own_rows(self, boats: int) -> tuple[Any, ...]:
-        """Where the decision that counts for each boat is: in the only one, or in its own."""
+        """Return where the decision that counts for each boat is: in the only one, or in its own."""
         return (0,) if self.config.coordination == "team" else (np.arange(boats), np.arange(boats))
 
     def _decided(self, scene: Scene) -> tuple[Array, BoolArray, IntArray, Array]:
-        """What is sent (n, 2), whether it is changed, why, and what is told: of the team, or of each boat its own."""
+        """Return filtered commands (n, 2), which are changed, reasons and reports: of the team, or each boat's own."""
         own = self._own_rows(len(scene.ours))
         reported = scene.reported[own]
         if self.config.coordination == "per_boat":
-            if scene.pending.shape[1] > 0:  # what each boat was told all others see
+            if scene.pending.shape[1] > 0:  # all see the command of each boat
                 scene.pending[:, -1] = scene.pending[own[0], -1, own[1]]
             for first in np.flatnonzero((scene.given[:, :, W.OURS] != 0.0).any(axis=1))[:1]:
                 reported[:, W.ADVERSARY_HORIZON_S] = scene.reported[first, :, W.ADVERSARY_HORIZON_S]
         return scene.sent[own], scene.changed[own], scene.reasons[own], reported
 
     def _keep_from(self, static: Static, scene: Scene) -> Static:
-        """Static constraints from now on; what was kept from others is no measure for these."""
+        """Set static constraints; margins remembered from other constraints do not apply to these."""
         if static is not self._kept_from:
             self._kept_from = static
             scene.memories[:, :, W.STATIC_MARGIN] = 0.0
@@ -370,7 +372,7 @@ class Shield:
 
 @kernel
 def _write_fresh(given: Array, state: Array, ours: BoolArray, nominal: Array, order: IntArray) -> None:
-    """Write boats in that order into what is given, (n, N_GIVEN): tracks fresh and exact, and no more known of them."""
+    """Write boats in that order into ``given``, (n, N_GIVEN): tracks fresh and exact, and nothing else known."""
     for k in range(order.shape[0]):
         i = order[k]
         given[k, :] = 0.0
@@ -382,7 +384,7 @@ def _write_fresh(given: Array, state: Array, ours: BoolArray, nominal: Array, or
 
 
 def _check(fleet: Fleet, wanted: Commands, config: ShieldConfig) -> None:
-    """Raise a FleetError for what is of another kind, or has values or shapes that cannot be used."""
+    """Raise a FleetError for arguments of another kind, or with values or shapes that cannot be used."""
     if not isinstance(fleet, Fleet) or not isinstance(wanted, Commands):
         raise FleetError(
             f"decide takes a Fleet and Commands, not {type(fleet).__name__} and {type(wanted).__name__}; build "
@@ -400,30 +402,30 @@ def _check(fleet: Fleet, wanted: Commands, config: ShieldConfig) -> None:
 
 
 def _boats_in(fleet: Fleet) -> tuple[Any, ...]:
-    """What tells the boats of one fleet from those of another."""
+    """Return what distinguishes the boats of one fleet from those of another."""
     return fleet.platforms, fleet.names, fleet.team.tobytes()
 
 
 def barriers_of(config: ShieldConfig) -> RegisteredBarriers:
-    """The registered barriers that a shield of such settings keeps."""
+    """Return the registered barriers of a shield with these settings."""
     return RegisteredBarriers(config.barriers, off_m(config) + SAG_M, steps_of_delay(config) * config.dt_s)
 
 
 @lru_cache(maxsize=256)
 def order_of(names: tuple[str, ...]) -> tuple[IntArray, IntArray]:
-    """Indices (n,) of boats by their names, numbers in them by their size; and each boat's place in that order."""
+    """Return indices (n,) of boats by name, with numbers in names by size; and each boat's place in that order."""
     order = np.array(sorted(range(len(names)), key=lambda i: _parts(names[i])), dtype=np.int64)
     return order, np.argsort(order)
 
 
 def _parts(name: str) -> list[tuple[int, str, str]]:
-    """A name as what it is compared by: texts and, at every other place, numbers of any length."""
+    """Return a name's sort key: texts and, at every other place, numbers of any length."""
     parts = enumerate(re.split("([0-9]+)", name))
     return [(len(part.lstrip("0")), part.lstrip("0"), part) if k % 2 else (0, "", part) for k, part in parts]
 
 
 def _tight_spot() -> tuple[Fleet, Commands, Surroundings]:
-    """Two boats that run at each other between static constraints of each kind, an opponent far off: all is needed."""
+    """Return two boats that meet head on between static constraints of each kind, and a far opponent: all code runs."""
     fleet = Fleet.of(
         position_m=[(0.0, 0.0), (0.0, 4.2), (300.0, 3.0)],
         heading_rad=[0.0, np.pi, -np.pi / 2],

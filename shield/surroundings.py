@@ -1,7 +1,7 @@
-"""`Surroundings`: field edge, obstacles and keep-out circles the boats stay clear of.
+"""`Surroundings`: field edge, obstacles and keep-out circles that boats stay clear of.
 
-They all give way to keeping clear of boats. Obstacles stop a boat, and one that is stopped cannot get away: they come
-before what pursuing opponents may do. Edge and keep-out circles are rules, and come after it.
+All of them yield to keeping clear of known boats. A boat stopped by an obstacle cannot escape, so near obstacles come
+before pursuing opponents. Edge and keep-out circles are rules and come after pursuers.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .workspace import Registered, Static, new_registered
 Point = tuple[float, float]
 
 LAST_SHARE = 0.5
-"""Boats are stopped before an obstacle when within this share of the hull of it: until then they may turn away."""
+"""A boat is stopped before an obstacle within this share of its clearance; until then it may turn away."""
 
 NOWHERE = np.array([-np.inf, -np.inf, np.inf, np.inf])
 """The edge where there is none."""
@@ -40,9 +40,9 @@ class Surroundings:
         field: (xmin, ymin, xmax, ymax) to stay inside, or None.
         circles: (x, y, radius) of round obstacles.
         polygons: corner lists; their edges are walls, which boats stay outside of, or inside.
-        keep_out: (x, y, radius) the boat's centre stays out of, by rule.
+        keep_out: (x, y, radius) that the boat's centre stays out of, by rule.
         stops: (x, y, radius) at which the boat's centre is stopped, such as the own flag's circle in the games: an
-            obstacle without a hull.
+            obstacle without a clearance.
 
     Raises:
         ConfigError: a value is not finite or beyond 1e9, a radius negative, a polygon has fewer than three corners, or
@@ -72,9 +72,9 @@ class Surroundings:
             raise ConfigError("a polygon has fewer than three corners; give [(x, y), (x, y), (x, y), ...] in m")
 
     def pack(self, config: ShieldConfig, registered: Registered | None = None) -> Static:
-        """Arrays for compiled code, widened by the distances of the settings and by how far off a boat may be seen.
+        """Return arrays for compiled code, widened by the distances of the settings and by how far off a boat may be.
 
-        That is also how far a current carries it until a command has acted, and a little longer.
+        That includes the drift in a current until a command has acted, and a little longer.
 
         Raises:
             ConfigError: nothing of the field is left.
@@ -105,7 +105,7 @@ class Surroundings:
         )
 
     def _edge(self, config: ShieldConfig) -> Array:
-        """The rectangle (xmin, ymin, xmax, ymax) kept, m; infinite where there is none."""
+        """Return the rectangle (xmin, ymin, xmax, ymax) to stay inside, m; infinite where there is none."""
         if self.field is None or config.edge_m is None:
             return NOWHERE.copy()
         inside_m = config.edge_m + off_m(config)
@@ -119,12 +119,12 @@ class Surroundings:
 
 
 def off_m(config: ShieldConfig) -> float:
-    """How far off a boat may be a step on, m, with room to turn about; what drifts later is added to paths."""
+    """Return how far off a boat may be one step ahead, m, with room to turn; later drift is added along paths."""
     return config.position_error_m + config.current_mps * (config.delay_s + config.dt_s + 2.0 * LEAVE_S)
 
 
 def _each(name: str, value: object, form: str) -> tuple[Any, ...]:
-    """The entries of a list of things."""
+    """Return the entries of a list."""
     try:
         if isinstance(value, (str, bytes, Mapping)) or not isinstance(value, Iterable):
             raise TypeError("it is no list")
@@ -138,7 +138,7 @@ def _rows(name: str, value: object, form: str) -> tuple[Any, ...]:
 
 
 def _row(name: str, row: object, form: str) -> tuple[float, ...]:
-    """A row as a tuple of finite floats of a sensible size, as many as ``form`` names."""
+    """Return a row as a tuple of finite floats of a sensible size, as many as ``form`` names."""
     try:
         array = numbers(row)
     except NoNumbersError:

@@ -1,8 +1,8 @@
-"""Machine code made once, of the whole call tree: what of numba's inside that is built on stands here.
+"""Machine code made once, of the whole call tree; it relies on the numba internals listed in `USED`.
 
-numba makes machine code of every function with all it calls linked in, and again in each of its callers. Here what
-compiled code calls is typed and lowered only; machine code is made of the whole, for what Python calls. `unlike` says
-where a version of numba differs from what is built on; `jit` then compiles by numba's own means.
+numba makes machine code of every function with all it calls linked in, and again in each of its callers. Here,
+functions that compiled code calls are only typed and lowered; machine code is made of the whole, for functions that
+Python calls. If a version of numba differs from what is used (`unlike`), `jit` compiles in numba's own way.
 """
 
 # mypy: disable-error-code="attr-defined,assignment,misc,untyped-decorator,unused-ignore"
@@ -34,11 +34,11 @@ USED = {
     "_optimize_final_module": (JITCodeLibrary, ("self",)),
     "make_concrete_template": (typing, ("name", "key", "signatures")),
 }
-"""What is called and overridden: by name, where it is found, and its parameters."""
+"""Numba functions called and overridden here: name, owner and parameters."""
 
 
 def unlike() -> str:
-    """What of numba's inside is not as it is built on here; empty: nothing."""
+    """Return which numba internal differs from what is used here; empty: none."""
     for name, (owner, expected) in USED.items():
         found = getattr(owner, name, None)
         if found is None:
@@ -50,7 +50,7 @@ def unlike() -> str:
 
 
 class _Flags(compiler.Flags):
-    """numba's options; theirs are hashed one by one at every step of typing."""
+    """numba's options; its own class hashes them one by one at every step of typing."""
 
     __slots__ = ()
 
@@ -62,24 +62,24 @@ class _Flags(compiler.Flags):
 
 
 class _Part(JITCodeLibrary):
-    """What a function is lowered to, and the libraries of all it calls; no machine code is made of it."""
+    """A lowered function and the libraries of everything it calls; no machine code is made of it."""
 
     def __init__(self, *args: Any) -> None:
         super().__init__(*args)
         self._linking_libraries: dict[Any, None] = {}
 
     def finalize(self) -> None:
-        """Leave it to the whole."""
+        """Mark as final; `_Whole` makes the machine code."""
         self._finalized = True
 
     def add_linking_library(self, library: Any) -> None:
-        """Note what is called, and what that calls."""
+        """Note a called library, and those that it calls."""
         library._ensure_finalized()
         self._linking_libraries |= {library: None} | (library._linking_libraries if isinstance(library, _Part) else {})
 
 
 class _Whole(JITCodeLibrary):
-    """All parts of what Python calls."""
+    """All parts of a function that Python calls."""
 
     def _optimize_final_module(self) -> None:
         for function in self._final_module.functions:
@@ -90,7 +90,7 @@ class _Whole(JITCodeLibrary):
 
 
 class Kernel(CPUDispatcher):
-    """A function that is compiled for each kind of arguments: as a part for compiled code, as a whole for Python."""
+    """A function compiled for each kind of arguments: as a part for compiled callers, as a whole for Python."""
 
     def __init__(self, *args: Any, kept: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -110,19 +110,19 @@ class Kernel(CPUDispatcher):
         return self._parts[args]
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
-        """What a compiled caller asks for; not for each value of a constant anew."""
+        """Return what a compiled caller needs for typing; values of constants are not told apart."""
         kws = {name: types.unliteral(kind) for name, kind in kws.items()}
         python_signature, args = self._compiler.fold_argument_types(tuple(map(types.unliteral, args)), kws)
         signatures = [self._part(tuple(args)).signature]
         return typing.make_concrete_template("Call", self.py_func.__name__, signatures), python_signature, args, {}
 
     def get_overload(self, sig: Any) -> Any:
-        """What a compiled caller's code is found by."""
+        """Return what a compiled caller finds the code by."""
         return self._part(tuple(sigutils.normalize_signature(sig)[0])).fndesc
 
     @global_compiler_lock
     def compile(self, sig: Any) -> Any:
-        """What Python calls."""
+        """Return the entry point that Python calls."""
         args = tuple(sigutils.normalize_signature(sig)[0])
         if args not in self.overloads:
             self.add_overload(self._cache.load_overload(args, self.targetctx) or self._whole(args))
@@ -131,7 +131,7 @@ class Kernel(CPUDispatcher):
     def _whole(self, args: Any) -> Any:
         collecting = gc.isenabled()
         context = self.targetctx.subtarget(enable_nrt=self.targetoptions.get("_nrt", True))  # boxes arrays it returns
-        gc.disable()  # a sixth of the time, and next to nothing to collect
+        gc.disable()  # collecting takes a sixth of the time and frees almost nothing
         try:
             part = self._part(args)
             library = _Whole(context.codegen(), part.library.name)
@@ -142,7 +142,7 @@ class Kernel(CPUDispatcher):
             entry = context.get_executable(library, part.fndesc, part.environment)
         finally:
             gc.freeze()
-            gc.unfreeze()  # what was made is old, and not looked through at the next turn
+            gc.unfreeze()  # new objects count as old: the next collection skips them
             if collecting:
                 gc.enable()
         for name in (variable.name for variable in library._final_module.global_variables):

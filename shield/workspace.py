@@ -1,7 +1,7 @@
-"""The one record that compiled code is handed: what is given, decided and remembered, constants, and scratch.
+"""The one record that compiled code works on: inputs, results, memory, constants and scratch.
 
-A scene serves B decisions, one after another: arrays of all of them have B in front, all else is of the one under way.
-Row n of arrays of n + 1 rows is a manoeuvre on trial.
+A scene serves B decisions, one after another. Arrays over all decisions have B as first dimension; all others belong to
+the present decision. In arrays of n + 1 rows, row n is the manoeuvre on trial.
 """
 
 from __future__ import annotations
@@ -20,34 +20,36 @@ PASSED, LEAST_CHANGE, QP_RELAXED, BACKUP, BEST_EFFORT, HELD, NOT_COVERED, RIGHT_
 """Values of `decision.Reason`."""
 
 BY_QP, BY_LINE_SEARCH = 1, 2
-"""What found a least change; 0: nothing did."""
+"""What found a least change; 0: none was found."""
 
 LARGEST_COMMAND = 1e6
-"""Speeds, m/s, and relative headings, deg, beyond this are no commands: the model's squares of them overflow."""
+"""Speeds, m/s, and relative headings, deg, beyond this are not valid: their squares overflow in the model."""
 
 OURS, NOMINAL_SPEED, NOMINAL_TURN, AGE_S, ERROR_M, VISITING, HORIZON_S = (L.N_STATE + k for k in range(7))
-"""Columns of ``given`` behind the state: whether the boat is decided for, its nominal command, m/s and deg relative to
-its heading, age of its track, s, bound on its position error, m, `Fleet.visiting` and `Fleet.adversary_horizon_s`."""
+"""Columns of ``given`` after the state: whether the boat is decided for; its nominal command, m/s and deg relative to
+its heading; age of its track, s; bound on its position error, m; `Fleet.visiting`; `Fleet.adversary_horizon_s`."""
 DRIVEN, N_GIVEN = L.N_STATE + 7, L.N_STATE + 11
-"""And from there `Fleet.driven`."""
+"""Columns from ``DRIVEN`` on: `Fleet.driven`."""
 
 MARGIN_M, SLACK_M, ACTIVE, CUT_SHORT, ADVERSARY_HORIZON_S, SOLVER, N_REPORTED = range(7)
-"""Columns of ``reported``: safety margin and what is given up of it, m, the active constraint (see `Decisions.bound`),
-whether the search was ended by its limit, how long the boat counts as adversarial, s (NaN: it is no opponent), and what
-found a least change, see `BY_QP`."""
+"""Columns of ``reported``: safety margin and slack, m; active constraint, see `Decisions.bound`; whether the work
+budget ended the search; how long the boat is adversarial, s (NaN: no opponent); what found a least change, see `BY_QP`.
+"""
 
 HAS_BACKUP, BACKUP_SIDE, BACKUP_HEADING, BACKUP_SPEED, BACKUP_MARGIN, JOINT_MARGIN, STATIC_MARGIN = range(7)
-"""Columns of ``memory``: whether the boat holds a backup; its side (1: clockwise), the heading it ends on, deg (NaN:
-no turn is left) and speed, m/s; margins verified: of all boats, of runs of several opponents, of static constraints."""
+"""Columns of ``memory``: whether the boat holds a backup; its side (1: clockwise), end heading, deg (NaN: no turn is
+left), and speed, m/s; verified margins, m: from all boats, from several opponents rolled out, from static constraints.
+"""
 BACKING_UP, HOLD_S, DEADLOCK_S, DEADLOCK_DEG, FREE_S, BLOCKED_BY, GIVES_WAY, N_MEMORY = range(7, 15)
-"""Whether it was carried out, and for how long it still is whatever is wanted, s; and see `right_of_way`: for how long
-a teammate has kept the boat from turning, s, its heading when that began, deg, time since it was last, s, the
-teammate (-1: none), and the side to which it gives way (0: it does not). Then the margin against each opponent, m."""
+"""Whether the backup was carried out, and for how long it still is whatever the nominal command, s. Then, of
+`right_of_way`: for how long a teammate has kept the boat from turning, s; its heading when that began, deg; time since
+it last happened, s; the teammate (-1: none); the side to which the boat gives way (0: it does not). From ``N_MEMORY``
+on: the margin from each boat as an opponent, m."""
 
 
 RUN_X, RUN_Y, RUN_EAST, RUN_NORTH, RUN_SPEED, RUN_TO_X, RUN_TO_Y, RUN_WORST, RUN_WEIGHT, N_RUN = range(10)
-"""Columns of a pursuer's run: place, m, heading as a unit vector, speed, m/s, the way to the boat, m, the worst margin
-until now, m, and the weight of one below 0."""
+"""Columns of a pursuer's rollout: place, m; heading as a unit vector; speed, m/s; vector to the boat, m; worst margin
+so far, m; weight of a margin below 0."""
 
 
 class Boats(NamedTuple):
@@ -55,18 +57,18 @@ class Boats(NamedTuple):
 
     params: Array  # (n, N_PARAM) platform rows
     team: IntArray  # (n,)
-    fastest_mps: Array  # (n,) speed no boat of the kind exceeds over ground; the stored speed may lag behind it
+    fastest_mps: Array  # (n,) speed over ground that no boat of the kind exceeds; the stored speed may lag behind it
     granted_turn_dps: Array  # (n,) turn rate granted to each as an opponent at its top speed
     granted_acc_mps2: Array  # (n,) acceleration granted to each as an opponent
     regain_s: Array  # (n,) time from rest to top speed at the highest acceleration
     granted_dec_mps2: Array  # (n,) rate at which each, as an opponent, loses speed in a turn
     granted_loss: Array  # (n,) share of top speed that each, as an opponent, loses in its granted turn
     samples: IntArray  # (n,) path samples of the horizon
-    pursuit_samples: IntArray  # (n,) the same for which pursuers are followed once thrust is full; at least those
-    chase_samples: IntArray  # (n, n) beyond that, for which a pursuer (column) no faster than the boat (row) is
-    chased_samples: IntArray  # (n,) the most of them
-    ready_thrust: Array  # (n,) thrust, percent, from which a boat is taken to have all of it
-    thrust_samples: IntArray  # (n,) path samples until a boat has its thrust back at the latest
+    pursuit_samples: IntArray  # (n,) path samples for which pursuers are followed once thrust is full; >= ``samples``
+    chase_samples: IntArray  # (n, n) further samples for which a pursuer (column) no faster than the boat (row) is
+    chased_samples: IntArray  # (n,) the most of them in each row
+    ready_thrust: Array  # (n,) thrust, percent, that counts as full
+    thrust_samples: IntArray  # (n,) path samples within which a boat regains its thrust
     fade: Array  # (n,) factor of negative margins against pursuers per path sample
     static_samples: IntArray  # (n,) samples until a half turn could be over
     stride: int  # model steps between path samples
@@ -75,51 +77,51 @@ class Boats(NamedTuple):
     n_manoeuvres: IntArray  # (n,) how many those are
     decay: Array  # (n,) factor by which a margin may shrink in one step; 0: it may fall to 0 at once
     cap_m: Array  # (n,) margins above this may shrink freely, m
-    min_backup_hold_s: Array  # (n,) least time for which a backup from opponents is carried on with, s
+    min_backup_hold_s: Array  # (n,) least time for which a backup from opponents is continued, s
     tables: Tables
     table: IntArray  # (n, n) table of each own boat (row) with each opponent (column), -1 for none
-    table_margin_m: float  # added to the radius where a table is looked into, m
+    table_margin_m: float  # added to the radius where a table is looked up, m
     table_steps: IntArray  # (n,) steps ahead at which backups are compared by table, 0 for boats without one
-    joint_decay: float  # factor by which the margin on runs of several opponents may shrink in one step
+    joint_decay: float  # factor by which the margin from several opponents rolled out may shrink in one step
     joint_samples: int  # path samples over which several opponents are rolled out before they are looked up
     has_table: BoolArray  # (n,) whether some boat's table is about this boat
 
 
 class Registered(NamedTuple):
-    """The k registered barriers that are kept; written before every decision."""
+    """The k registered barriers in force; written before every decision."""
 
-    address: IntArray  # (k,) where their functions are, in this process
-    values: Array  # (k, MOST_VALUES) the numbers they are given now, NaN beyond
-    size: IntArray  # (k,) how many those are; -1: they could not be had, and nothing is known of the barrier
+    address: IntArray  # (k,) addresses of their functions in this process
+    values: Array  # (k, MOST_VALUES) their present values, NaN beyond
+    size: IntArray  # (k,) how many those are; -1: they are missing, and the barrier is unknown
     faults: IntArray  # (k,) how often they gave no usable margin in this decision
     off_m: float  # how far off a boat may be, and how much a margin may fall short between two samples, m
-    late_s: float  # time until the moment that is decided for, s
+    late_s: float  # time until the commands take effect, s
 
 
 MOST_VALUES = 64
-"""Numbers that one registered barrier may be given."""
+"""Most values of one registered barrier."""
 
 
 def new_registered(count: int = 0, off_m: float = 0.0, late_s: float = 0.0) -> Registered:
-    """So many barriers, of which nothing is known yet."""
+    """Return ``count`` barriers that are unknown so far."""
     values, size = np.full((count, MOST_VALUES), np.nan), np.full(count, -1)
     return share(Registered(np.zeros(count, np.int64), values, size, np.zeros(count, np.int64), off_m, late_s))
 
 
 class Static(NamedTuple):
-    """Things that do not move, already widened by the distance to keep from them."""
+    """Static constraints, already widened by the clearance from them."""
 
     field: Array  # (xmin, ymin, xmax, ymax), m; infinite where there is no edge
-    keep_out: Array  # (k, 3) circles kept by rule: centre x, y and radius, m
+    keep_out: Array  # (k, 3) keep-out circles: centre x, y and radius, m
     circles: Array  # (c, 3) the same of obstacles
     segments: Array  # (s, 4) ends x0, y0, x1, y1 of walls, m
-    segment_m: float  # distance to keep from walls, m
-    side_m: float  # distance from a wall within which it is not known on which side of it a boat is, m
-    current_mps: float  # bound on the speed of a current whose direction is not known, m/s
+    segment_m: float  # clearance from walls, m
+    side_m: float  # distance from a wall within which a boat's side of it is unknown, m
+    current_mps: float  # bound on the speed of a current of unknown direction, m/s
     line: Array  # (xmin, ymin, xmax, ymax) of the hard line that stops boats, m; infinite where none does
-    last_circles: int  # how many of the first circles and
-    last_segments: int  # of the first segments stop boats before them, whatever else is in their way
-    last_m: float  # how much nearer than the distance to keep these do, m
+    last_circles: int  # number of leading circles, and
+    last_segments: int  # of leading segments, before which boats are stopped whatever else is in their way
+    last_m: float  # how much nearer than the clearance that happens, m
     registered: Registered
 
 
@@ -132,107 +134,107 @@ class Tuning(NamedTuple):
     radius_m: float  # separation radius with buffer
     buffer_m: float  # the buffer in it
     straight_horizon_s: float  # how long straight runs are continued beyond the horizon
-    margin_cap_m: float  # margins above this are not looked at closely
+    margin_cap_m: float  # margins above this are not computed exactly
     speed_weight: float  # cost of changing the speed by top speed, full rudder to no rudder costing 1
     teammate_margin_cap_m: float  # margins from teammates above this may shrink freely
     static_decay: float  # factor by which a margin from static constraints may shrink in one step
     deadlock_timeout_s: float  # time a boat is kept from turning before one of the two gives way
     adversary_horizon_s: float  # time for which an opponent is adversarial; 0: nobody is
-    intruder_horizon_s: float  # the same of opponents on our side of a field
+    intruder_horizon_s: float  # the same for opponents on the own side of a field
     position_error_m: float  # bound on the error of every position
     delay_s: float  # time from own commands to their effect
-    track_error_mps: float  # how fast what is known of a position goes bad
+    track_error_mps: float  # growth of a position error with the age of its track
     work_budget: float  # cost at which a decision searches no further, see `backup.assign`
 
 
 class Scene(NamedTuple):
-    """All that decisions are made with, as one `shared` tuple; a shape is of the fields that are allocated anew."""
+    """Everything that decisions work on, as one `shared` tuple; fields with a shape are allocated by `new_scene`."""
 
     boats: Boats
     static: Static
     tuning: Tuning
     # of all decisions
     given: Annotated[Array, "B", "n", N_GIVEN]
-    sent: Annotated[Array, "B", "n", 2]  # commands as those given; bit for bit those where nothing is changed
-    changed: Annotated[BoolArray, "B", "n"]  # whether any bit is
+    sent: Annotated[Array, "B", "n", 2]  # filtered commands; the nominal ones' bits where unchanged
+    changed: Annotated[BoolArray, "B", "n"]  # whether any bit is changed
     reasons: Annotated[IntArray, "B", "n"]
     reported: Annotated[Array, "B", "n", N_REPORTED]
     memories: Annotated[Array, "B", "n", "memory"]
-    pending: Annotated[Array, "B", "delay", "n", 2]  # commands on their way, see `tracks.roll_out_pending`
+    pending: Annotated[Array, "B", "delay", "n", 2]  # commands not yet in effect, see `tracks.roll_out_pending`
     # of this decision
     state: Annotated[Array, "n", L.N_STATE]  # boats at the moment the commands take effect
-    ours: Annotated[BoolArray, "n"]  # boats decided for now: of one group, while that is open
+    ours: Annotated[BoolArray, "n"]  # boats decided for now; of one group while it is open
     memory: Annotated[Array, "n", "memory"]
     error_m: Annotated[Array, "n"]  # bound on the error of each position
     nominal: Annotated[Array, "n", 2]  # nominal commands, speed m/s and relative heading deg
-    checked: Annotated[Array, "n", 2]  # those the nominal check looked at: else where a boat holds or gives way
+    checked: Annotated[Array, "n", 2]  # those of the nominal check: others where a boat holds or gives way
     checked_turn: Annotated[Array, "n"]  # turn of this step under them, deg
     checked_reason: Annotated[IntArray, "n"]
     command: Annotated[Array, "n", 2]  # candidate commands
-    next_state: Annotated[Array, "n", L.N_STATE]  # states after them
-    stepped: Annotated[Array, "n", 2]  # the commands of that
+    next_state: Annotated[Array, "n", L.N_STATE]  # states one step after them
+    stepped: Annotated[Array, "n", 2]  # the commands that led there
     reason: Annotated[IntArray, "n"]
     solver: Annotated[IntArray, "n"]  # what found the command, between nominal one and backup: `BY_QP` and the like
     slack_m: Annotated[Array, "n"]
-    violated: Annotated[IntArray, "n"]  # what the nominal command is short of, as in ``bound``; -1: nothing
+    violated: Annotated[IntArray, "n"]  # constraint that the nominal command violates, as in ``bound``; -1: none
     group: Annotated[IntArray, "n"]  # see `filter.groups`
     moving: Annotated[BoolArray, "n"]  # boats whose commands are being changed
     movers: Annotated[IntArray, "n"]  # their list,
     mover_of: Annotated[IntArray, "n"]  # and each boat's place in it, -1: none
-    held: Annotated[Array, "n", 3]  # manoeuvre gone on with from other states: side, end heading deg (NaN), m/s
-    verified: Annotated[Array, "n", 5]  # what backups come to, see `filter.blend`
+    held: Annotated[Array, "n", 3]  # manoeuvre continued from other states: side, end heading deg (NaN), m/s
+    verified: Annotated[Array, "n", 5]  # results of verified backups, see `filter.blend`
     # neighbours
     near: Annotated[BoolArray, "n", "n"]  # pairs that can matter
     inside_separation: Annotated[BoolArray, "n", "n"]  # pairs inside the separation
-    radius: Annotated[Array, "n", "n"]  # radius to keep
-    course: Annotated[Array, "n", 4]  # position one step on at present velocity, and heading as a unit vector
-    pursued: Annotated[BoolArray, "n"]  # whether an opponent that may pursue the boat is near
+    radius: Annotated[Array, "n", "n"]  # required distance, m
+    course: Annotated[Array, "n", 4]  # position one step ahead at present velocity, and heading as a unit vector
+    pursued: Annotated[BoolArray, "n"]  # whether an opponent near the boat may pursue it
     outnumbered: Annotated[BoolArray, "n"]  # whether several can come near to it, see `barriers.value_function`
     reach_samples: Annotated[IntArray, "n"]  # path samples over which opponents may be followed
     driven: Annotated[Array, "n", 4]
-    known: Annotated[BoolArray, "n"]  # boats whose way is predicted, in ``path``, by what drives them
+    known: Annotated[BoolArray, "n"]  # boats whose way is predicted by what drives them, in ``path``
     adversary_horizon_s: Annotated[Array, "n"]  # time from now for which each opponent is adversarial
     # required margins, m
-    target: Annotated[Array, "n"]  # from boats that are not ours
-    teammate_target_m: Annotated[Array, "n"]  # from those that are
+    target: Annotated[Array, "n"]  # from boats that are not own
+    teammate_target_m: Annotated[Array, "n"]  # from own boats
     threat_target_m: Annotated[Array, "n", "n"]  # from each pursuing opponent
-    joint_target_m: Annotated[Array, "n"]  # on runs of several
+    joint_target_m: Annotated[Array, "n"]  # from several opponents rolled out
     static_target_m: Annotated[Array, "n"]  # from static constraints
-    # manoeuvres held, and in row n on trial
+    # manoeuvres held; row n: on trial
     manoeuvre: Annotated[Array, "n+1", 3]  # side, turn to go deg, speed m/s
     path: Annotated[Array, "n+1", "samples", 2]  # positions along it, or along the way of predicted boats
-    ready: Annotated[Array, "n+1", 3]  # what is noted of the path, see `backup.rollout`
+    ready: Annotated[Array, "n+1", 3]  # notes on the path, see `backup.paths.READY_SAMPLE`
     look: Annotated[Array, "n+1", 5]  # place at which the boat is looked up in tables
     clear: Annotated[Array, "n+1", 4]  # clearance row of boats
     static_clear: Annotated[Array, "n+1", 4]  # clearance row of static constraints,
     static_by: Annotated[IntArray, "n+1"]  # which of them it is from,
-    static_known: Annotated[BoolArray, "n+1"]  # and whether these are of the path that is there
+    static_known: Annotated[BoolArray, "n+1"]  # and whether these belong to the present path
     bound: Annotated[IntArray, "n+1"]  # active constraint: a boat, -1 none, -2 and below static ones
-    satisfied: Annotated[IntArray, "n"]  # what it satisfies, see `backup.rank`,
+    satisfied: Annotated[IntArray, "n"]  # level that it satisfies, see `backup.rank`,
     score_m: Annotated[Array, "n"]  # and the other entry of its score
-    violates_known: Annotated[BoolArray, "n+1"]  # whether a required margin from boats whose way is known is not there
+    violates_known: Annotated[BoolArray, "n+1"]  # whether a required margin from boats whose way is known is violated
     violates_pursuers: Annotated[BoolArray, "n+1"]  # the same against pursuers
     threat_m: Annotated[Array, "n+1"]  # least margin against pursuers
     threat_by: Annotated[IntArray, "n+1"]  # the opponent it is from, -1: none
-    threats_m: Annotated[Array, "n+1", "n"]  # margin against each, as far as they were looked at
-    joint_m: Annotated[Array, "n+1"]  # least on runs of several opponents
-    table_m: Annotated[Array, "n+1"]  # least that tables tell where they are looked up first
-    pursuers_known: Annotated[BoolArray, "n+1"]  # whether these are all those of the path that is there
+    threats_m: Annotated[Array, "n+1", "n"]  # margin from each, as far as they were checked
+    joint_m: Annotated[Array, "n+1"]  # least from several opponents rolled out
+    table_m: Annotated[Array, "n+1"]  # least that tables give at the first lookup
+    pursuers_known: Annotated[BoolArray, "n+1"]  # whether these are all, for the present path
     refused_by_table: Annotated[BoolArray, "n+1"]  # whether a table alone made the manoeuvre fail
-    searched: Annotated[IntArray, "n"]  # changes of manoeuvres when a boat was last searched for, -1: never
+    searched: Annotated[IntArray, "n"]  # changes of manoeuvres at the last search for a boat, -1: never
     # scratch
     row: Annotated[Array, L.N_STATE]
     out: Annotated[Array, 4]
     spare2: Annotated[Array, 4]
-    ways: Annotated[Array, "n", 3, 5]  # places an opponent may be at when tables are looked into
-    lookup: Annotated[Array, "n", "n", 5]  # place of each boat at which each opponent was looked up last, and margin
-    runs: Annotated[Array, 2, N_RUN]  # runs of a pursuer: straight for the boat, and leading it
+    ways: Annotated[Array, "n", 3, 5]  # places at which an opponent may be when tables are looked up
+    lookup: Annotated[Array, "n", "n", 5]  # place of each boat at the last lookup of each opponent, and margin
+    runs: Annotated[Array, 2, N_RUN]  # rollouts of a pursuer: straight for the boat, and leading it
     turns: Annotated[Array, 6, 2]  # cosine and sine of its hardest turns in as many samples and fewer
-    first_pursuer: Annotated[IntArray, "n"]  # opponent that is looked at first,
-    first_rudder: Annotated[IntArray, "n", "n"]  # and how hard it turns in the runs that are made first
-    cost: Annotated[Array, "n"]  # what rating a manoeuvre of the boat costs,
-    spent: Annotated[Array, 1]  # what this decision has cost until now,
-    cut_short: Annotated[BoolArray, 1]  # and whether its search was ended by its limit
+    first_pursuer: Annotated[IntArray, "n"]  # opponent that is checked first,
+    first_rudder: Annotated[IntArray, "n", "n"]  # and its rudder in the first rollouts
+    cost: Annotated[Array, "n"]  # cost of scoring a manoeuvre of the boat,
+    spent: Annotated[Array, 1]  # cost of this decision so far,
+    cut_short: Annotated[BoolArray, 1]  # and whether the work budget ended its search
     # quadratic program, two inputs a mover, see `filter.qp`
     gain: Annotated[Array, "n", 3]
     z_now: Annotated[Array, "2n"]
@@ -245,28 +247,28 @@ class Scene(NamedTuple):
 
 
 MOST_ROWS = 3000
-"""Where a program would have more rows than this, the backups are sent instead."""
+"""If a QP would have more rows than this, the backups are sent instead."""
 
 _KINDS: dict[Any, type] = {Array: np.float64, IntArray: np.int64, BoolArray: np.bool_}
 
 
 @cache
 def _arrays_of_a_scene() -> list[tuple[str, Any, tuple[int | str, ...]]]:
-    """Name, kind and shape of the fields of a scene that are allocated anew."""
+    """Return name, kind and shape of the fields of a scene that `new_scene` allocates."""
     hints = get_type_hints(Scene, include_extras=True).items()
     found = [(name, get_args(hint)) for name, hint in hints if get_origin(hint) is Annotated]
     return [(name, kind, tuple(shape)) for name, (kind, *shape) in found]
 
 
 def new_scene(decisions: int, boats: Boats, static: Static, tuning: Tuning, delay: int) -> Scene:
-    """A scene in which nothing is to be decided about yet.
+    """Build a scene for a number of decisions.
 
     Args:
         decisions: how many it serves.
         boats: their constants.
         static: static constraints.
         tuning: the settings.
-        delay: decisions whose commands are on their way at any time.
+        delay: decisions whose commands are not yet in effect, at any time.
     """
     n = len(boats.team)
     sizes = {
@@ -287,39 +289,39 @@ def new_scene(decisions: int, boats: Boats, static: Static, tuning: Tuning, dela
 
 
 def part_of(scene: Scene, static: Static, first: int, last: int, delay: int) -> Scene:
-    """Decisions ``first`` to ``last`` - 1 of a scene, the very arrays, with scratch of their own for another thread."""
+    """Return decisions ``first`` to ``last`` - 1 of a scene, sharing its arrays, with scratch for another thread."""
     part = new_scene(last - first, scene.boats, static, scene.tuning, delay)
     of_all = {name: getattr(scene, name)[first:last] for name, _, shape in _arrays_of_a_scene() if shape[0] == "B"}
     return share(part._replace(**of_all))
 
 
 def new_memory(decisions: int, boats: int) -> Array:
-    """Memory, (B, n, N_MEMORY + n), of boats that hold no manoeuvre yet."""
+    """Return memory, (B, n, N_MEMORY + n), of boats that hold no manoeuvre yet."""
     memories = np.zeros((decisions, boats, N_MEMORY + boats))
     memories[..., BACKUP_SIDE], memories[..., BLOCKED_BY] = 1.0, -1.0
     return memories
 
 
 def path_samples(boats: Boats) -> int:
-    """Path samples that paths of these boats have at most."""
+    """Return the most samples that paths of these boats have."""
     return int((boats.pursuit_samples + boats.thrust_samples + boats.chased_samples).max(initial=1))
 
 
 PATH_COST = 2.0
-"""Cost of tracing a path. The unit is the clearance of one path from one boat that holds its course, about a
-microsecond: counted in work, not in seconds, so that the same inputs give the same bits anywhere."""
+"""Cost of rolling out a path. The unit is the clearance of one path from one boat that holds its course, about a
+microsecond. Work is counted, not seconds, so that the same inputs give the same bits on any machine."""
 PURSUER_COST = 5.0
-"""Cost of rolling an opponent out as a pursuer, in every manner, or of looking it up."""
+"""Cost of rolling out an opponent as a pursuer, in all variants, or of looking it up."""
 ROW_COST = 0.02
-"""Cost of the program for each of its rows and boats."""
+"""Cost of the QP for each of its rows and boats."""
 
 
 @lean_kernel
 def all_spent(scene: Scene) -> bool:
-    """Whether the decision is to search no further; it is then told that it was cut short.
+    """Return whether the work budget is used up; if so, note that the decision is cut short.
 
-    Every boat then keeps the best manoeuvre found for it so far, at first the one it has held since the last decision,
-    and what is sent passes the same exact check as ever.
+    Every boat then keeps the best manoeuvre found so far, at first the one held since the last decision. The commands
+    pass the same exact check as always.
     """
     if scene.spent[0] <= scene.tuning.work_budget:
         return False
@@ -329,5 +331,5 @@ def all_spent(scene: Scene) -> bool:
 
 @lean_kernel
 def unchanged(i: int, scene: Scene) -> bool:
-    """Whether boat i's command is the nominal one, bit for bit."""
+    """Return whether boat i's command is the nominal one, bit for bit."""
     return scene.command[i, 0] == scene.checked[i, 0] and scene.command[i, 1] == scene.checked[i, 1]

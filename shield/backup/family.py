@@ -1,8 +1,7 @@
-"""The certificates by name: which backup manoeuvres they look at, and whether opponents are run through or looked up.
+"""Opponent models by name: a family of backup manoeuvres, with opponents rolled out or looked up in value tables.
 
-A certificate of this kind is a family of manoeuvres; h is as in `barriers.boats`. Each row of a family is
-(side, turn deg, speed): side clockwise when > 0, its size the share of full rudder; speed a fraction of top speed or
-`COMMANDED`.
+A model's h is as in `barriers.boats`. Each row of a family is (side, turn deg, speed). Side is clockwise when > 0; its
+size is the share of full rudder. Speed is a fraction of top speed, or `COMMANDED`.
 """
 
 from __future__ import annotations
@@ -21,35 +20,35 @@ from ..workspace import BACKUP_HEADING, BACKUP_SIDE, BACKUP_SPEED, HAS_BACKUP, S
 from .paths import angle_to_go
 
 IN_MEMORY, FOUND, FAMILY = range(3)
-"""Numbers of the manoeuvres: that under way, that in ``scene.held``, and from `FAMILY` on those of `Boats.plans`."""
+"""Manoeuvre numbers: the remembered one, that in ``scene.held``, and from `FAMILY` on those of `Boats.manoeuvres`."""
 
 COMMANDED = -1.0
-"""Speed entry of a manoeuvre that keeps the commanded speed."""
+"""Speed entry of a manoeuvre at the commanded speed."""
 
 DONE_DEG = 270.0
-"""A turn to go beyond this is one that has been overshot: it is done."""
+"""A turn left beyond this has been overshot: it counts as done."""
 
 FURTHEST_DEG = 200.0
-"""Largest turn to go with which a manoeuvre is committed to again."""
+"""Largest turn left with which a manoeuvre is committed to again."""
 
 TURNS_DEG = tuple(15.0 * k for k in range(1, 13))
-"""Hard turns of boats whose opponents are run through. The finer, the sooner one is found that is small enough."""
+"""Full-rudder turns of boats whose opponents are rolled out. With finer steps a small enough turn is found sooner."""
 
 LOOKED_UP_TURNS_DEG = (15.0, 30.0, 45.0, 60.0, 90.0, 120.0, 180.0)
-"""The same of boats with a value table, which tells what play after the next step is worth, wherever a turn ends."""
+"""The same of boats with a value table, which gives the value of play after the next step, wherever a turn ends."""
 
 GENTLE_SHARES = (0.5, 0.25)
-"""Rudders of half turns that boats with a value table look at besides: a hard turn costs speed, and with it room."""
+"""Rudder shares of further half turns of boats with a value table: a hard turn costs speed, and with it room."""
 
 SLOWING_TURNS_DEG = (45.0, 90.0, 180.0)
 SLOWING_SPEEDS = (0.5, 0.0)
-"""Turns made at less than full speed, which boats that steer without thrust look at besides: `Certificate.slowing`."""
+"""Turns below full speed, which boats that steer without thrust try as well, see `Certificate.slowing`."""
 
 SLOW_TO_REGAIN_S = 5.0
-"""Boats that take longer than this to be up to speed again are looked up under the certificate "auto".
+"""Under "auto", boats that take longer than this to regain top speed look opponents up in value tables, s.
 
-What a boat can do against pursuers after it has lost its speed hangs on play too long to be run through well; nimble
-boats are better run through, one manoeuvre against all pursuers at once.
+What a boat can do against pursuers after it has lost its speed depends on play too long to be rolled out well. For
+nimble boats rollouts are better: one manoeuvre against all pursuers at once.
 """
 
 REACTION_S = 4.0
@@ -61,14 +60,14 @@ LONGEST_PURSUIT_S = 60.0
 
 @dataclass(frozen=True)
 class Certificate:
-    """Families of backup manoeuvres, rows of side, turn deg, speed, with their horizon.
+    """Families of backup manoeuvres, rows of (side, turn deg, speed), with their horizon.
 
     Attributes:
         name: its name in settings.
-        summary: what h means, one line.
-        rolled_out: (m, 3) manoeuvres of boats whose opponents are run through.
+        summary: meaning of h, one line.
+        rolled_out: (m, 3) manoeuvres of boats whose opponents are rolled out.
         looked_up: (m, 3) manoeuvres of boats whose opponents are looked up in value tables.
-        slowing: (m, 3) what boats look at besides that steer without thrust; others lose their rudder with it.
+        slowing: (m, 3) further manoeuvres of boats that steer without thrust; other boats lose their rudder with it.
         tables: which boats look opponents up in value tables: "none", "slow" ones, or "all".
     """
 
@@ -80,21 +79,21 @@ class Certificate:
     tables: str = "none"
 
     def horizon_s(self, platform: Platform, dt_s: float) -> float:
-        """Time over which the manoeuvres are followed, s."""
+        """Return the time over which the manoeuvres are followed, s."""
         return limits_of(platform, dt_s).half_turn_s + REACTION_S
 
     def manoeuvres(self, platform: Platform, with_table: bool) -> Array:
-        """(m, 3) manoeuvres that a boat looks at, in the order in which they are tried."""
+        """Return the (m, 3) manoeuvres of a boat, in the order in which they are tried."""
         rolled_out = self.looked_up if with_table else self.rolled_out
         return np.vstack([rolled_out, self.slowing]) if platform.kind == "rate" else rolled_out
 
     def uses_table(self, limits: Limits) -> bool:
-        """Whether a boat looks opponents up where there is a table."""
+        """Return whether a boat looks opponents up where there is a table."""
         slow = limits.top_speed_mps > SLOW_TO_REGAIN_S * limits.acceleration_mps2
         return self.tables == "all" or (self.tables == "slow" and slow)
 
     def pursuit_s(self, limits: Limits) -> float:
-        """Time over which pursuing opponents are followed, s: a boat outruns them only once it is up to speed again."""
+        """Return how long pursuers are followed, s: a boat outruns them only once it has regained its speed."""
         return min(LONGEST_PURSUIT_S, limits.half_turn_s + REACTION_S + limits.regain_s)
 
 
@@ -141,7 +140,7 @@ CERTIFICATES = {certificate.name: certificate for certificate in (AUTO, TURNING_
 
 @lean_kernel
 def turn_left(heading_deg: float, target_deg: float, side: float) -> float:
-    """Turn still to make of a manoeuvre to one side that ends on a heading (NaN: none), deg; past that it is done."""
+    """Return the turn left, deg, of a manoeuvre to one side that ends on a heading (NaN: no turn); 0 once past it."""
     if math.isnan(target_deg):
         return 0.0
     togo = angle_to_go(heading_deg, target_deg, side)
@@ -150,17 +149,17 @@ def turn_left(heading_deg: float, target_deg: float, side: float) -> float:
 
 @lean_kernel
 def kept_turn(i: int, heading_deg: float, scene: Scene) -> float:
-    """Turn still to make of the manoeuvre in memory, deg."""
+    """Return the turn left of the remembered manoeuvre, deg."""
     memory = scene.memory
     return turn_left(heading_deg, memory[i, BACKUP_HEADING], memory[i, BACKUP_SIDE])
 
 
 @lean_kernel
 def remembered(i: int, done: int, heading_deg: float, scene: Scene) -> bool:
-    """Whether the manoeuvre in memory can be offered.
+    """Return whether the remembered manoeuvre can be offered.
 
-    A boat told to turn away from it for long is offered another in good time: once committed to, a manoeuvre must not
-    run over the angle at which it would be taken for done, not even by the way a boat still spins.
+    A boat whose commands turn it away from its manoeuvre for long is offered another in good time. A manoeuvre that is
+    committed to must not pass the angle at which it counts as done, not even by the turn that a boat still makes.
     """
     memory = scene.memory
     return memory[i, HAS_BACKUP] > 0.0 and (done == 0 or kept_turn(i, heading_deg, scene) <= FURTHEST_DEG)
@@ -168,13 +167,13 @@ def remembered(i: int, done: int, heading_deg: float, scene: Scene) -> bool:
 
 @lean_kernel
 def found_turn(i: int, heading_deg: float, held: Array) -> float:
-    """Turn still to make of the manoeuvre noted in ``held``, see `assign.hold`, deg."""
+    """Return the turn left of the manoeuvre in ``held``, see `assign.hold`, deg."""
     return turn_left(heading_deg, held[i, 1], held[i, 0])
 
 
 @lean_kernel
 def candidate(i: int, p: int, wanted_mps: float, heading_deg: float, scene: Scene) -> tuple[float, float, float]:
-    """Manoeuvre number p of boat i: `IN_MEMORY`, `FOUND`, or one of the family; (side, turn deg, speed m/s)."""
+    """Return manoeuvre p of boat i, `IN_MEMORY`, `FOUND` or one of the family: (side, turn deg, speed m/s)."""
     boats, memory, held = scene.boats, scene.memory, scene.held
     if p == IN_MEMORY:
         return memory[i, BACKUP_SIDE], kept_turn(i, heading_deg, scene), memory[i, BACKUP_SPEED]

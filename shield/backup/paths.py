@@ -1,9 +1,9 @@
-"""Where a boat goes under a backup manoeuvre: turn to one side, then straight, at a set speed.
+"""Paths of backup manoeuvres: a turn to one side, then straight on, at a set speed.
 
-The sign of ``side`` is the side, 1 clockwise; its size, up to 1, the share of full rudder the turn is made with.
+The sign of ``side`` is the side, 1 clockwise. Its size, up to 1, is the share of full rudder in the turn.
 
-Paths are sampled every ``stride`` steps of the boat's model. Sample 0 is where the boat is one step from now: after the
-candidate command, or after the manoeuvre's own first step.
+Paths are sampled every ``stride`` steps of the boat's model. Sample 0 is where the boat is one step from now: after
+the candidate command, or after the manoeuvre's own first step.
 """
 
 from __future__ import annotations
@@ -17,29 +17,29 @@ from ..platforms.actuator import actuate, full_turn, held_rudder
 from ..platforms.usv import kept_share, next_thrust, speed_of_thrust, speed_towards, turn_of_rudder
 
 SAG_M = 0.022
-"""Most a straight line between two samples may cut off the arc sailed between them, m."""
+"""Largest distance between the arc sailed between two samples and the straight line, m."""
 
 READY_SAMPLE, READY_HEADING, READY_SPEED = range(3)
-"""What is noted of a path: the sample where thrust is full (-1: never), heading, rad, and speed, m/s, there."""
+"""Notes on a path: the sample where thrust is full (-1: never), heading, rad, and speed, m/s, there."""
 
 STEADY_SPEED = 1e-4
-"""Change of speed (m/s) and thrust (percent) per step below which a straight run is taken as steady."""
+"""Change of speed (m/s) plus thrust (percent) per step below which a straight run counts as steady."""
 
 ALIKE = 1e-4
-"""A run settles where steps tell the same of the speed still to be gained, to this share of it,"""
+"""A run settles if consecutive steps predict the same remaining gain of speed, to this share of it."""
 
 SETTLED_MPS = 1e-3
-"""and it takes that to within this of the speed commanded, m/s, which is not 0: there it would be cut off.
+"""It must also settle within this of the commanded speed, m/s, and that speed must exceed this: at 0 it is cut off.
 
-Only of a boat that gains speed: one that slows down may seem to settle there for one step of its way below."""
+Only a boat that gains speed counts: one that slows down may seem to settle there for one step on its way below."""
 
 
 class Manoeuvre(NamedTuple):
-    """Turn to one side, then straight on.
+    """A turn to one side, then straight on.
 
     Attributes:
         side: clockwise when > 0; its size is the share of full rudder.
-        togo_deg: turn to make before running straight, deg, >= 0.
+        togo_deg: turn left before running straight, deg, >= 0.
         speed_mps: speed commanded throughout, m/s.
     """
 
@@ -49,18 +49,18 @@ class Manoeuvre(NamedTuple):
 
 
 class Span(NamedTuple):
-    """What of a manoeuvre's path is written, and how.
+    """Which part of a manoeuvre's path is written, and how.
 
     Attributes:
         dt_s: model step, s.
-        done: 0 when it starts in the present state; else in the state so many steps from now, and the samples until
-            then are written already (the first, of one step, is written with the rest).
+        done: 0 if the manoeuvre starts in the present state. Else it starts in the state so many steps from now, and
+            the samples until then are already written (the first, of one step, is written with the rest).
         stride: model steps between samples.
         samples: number of samples after sample 0.
-        least: number of them after which the path may end.
-        beyond: number of them after the one where thrust is full that the path goes on for.
-        earliest: first sample at which that counts, at most ``samples``.
-        ready_thrust: thrust, percent, from which the boat has all of it.
+        least: number of samples after which the path may end.
+        beyond: number of samples for which the path continues after the one where thrust is full.
+        earliest: first sample at which full thrust counts, at most ``samples``.
+        ready_thrust: thrust, percent, that counts as full.
     """
 
     dt_s: float
@@ -83,7 +83,7 @@ class Straight(NamedTuple):
 
 
 class AtThrust(NamedTuple):
-    """What a step with a thrust, percent, comes to: the turn, deg, and the speeds, m/s, tended to on and off it."""
+    """Result of a step at a thrust, percent: its turn, deg, and the speeds, m/s, tended to straight on and turning."""
 
     thrust: float
     turn_deg: float
@@ -92,15 +92,15 @@ class AtThrust(NamedTuple):
 
 
 class Settling(NamedTuple):
-    """How speed and thrust settle on a straight run: what they are short of falls in each step.
+    """How speed and thrust settle on a straight run: their shortfalls shrink in each step.
 
     Attributes:
         speed_mps: speed at which the run settles, m/s.
-        short_mps: what it is short of that now, m/s.
-        thrust: thrust at which it settles, percent.
-        short_thrust: what it is short of that now, percent.
-        rate: share of both that is left after a step.
-        fall_mps: what more the speed gains in a step, m/s.
+        short_mps: present shortfall from it, m/s.
+        thrust: thrust at which the run settles, percent.
+        short_thrust: present shortfall from it, percent.
+        rate: share of both shortfalls that is left after a step.
+        fall_mps: gain of speed in a step while it is constant, m/s; 0: it is not.
     """
 
     speed_mps: float
@@ -113,13 +113,13 @@ class Settling(NamedTuple):
 
 @lean_kernel
 def angle_to_go(heading_deg: float, target_deg: float, side: float) -> float:
-    """Turn, deg in [0, 360), that takes a boat to a heading going clockwise (side > 0) or the other way (< 0)."""
+    """Return the turn, deg in [0, 360), to a heading, going clockwise (side > 0) or the other way (< 0)."""
     return ((target_deg - heading_deg) * math.copysign(1.0, side)) % 360.0
 
 
 @lean_kernel
 def sail(params: Array, row: Array, side: float, togo_deg: float, speed_mps: float, dt_s: float) -> float:
-    """One model step of a backup manoeuvre on ``row``, in place; returns the turn still to make, deg."""
+    """Make one model step of a backup manoeuvre on ``row``, in place; return the turn left, deg."""
     before, sign = row[L.HEADING], math.copysign(1.0, side)
     turn = togo_deg
     if togo_deg > 0.0 and abs(side) < 1.0:
@@ -136,19 +136,19 @@ def sail(params: Array, row: Array, side: float, togo_deg: float, speed_mps: flo
 
 @lean_kernel
 def _is_ready(k: int, span: Span, thrust: float, ready: Array) -> bool:
-    """Whether sample k is the first, from the earliest that counts, at which thrust is full."""
+    """Return whether sample k is the first, from the earliest that counts, at which thrust is full."""
     return ready[READY_SAMPLE] < 0.0 and k >= span.earliest and thrust >= span.ready_thrust
 
 
 @lean_kernel
 def _note_ready(k: int, ux: float, uy: float, speed_mps: float, ready: Array) -> None:
-    """Note that thrust is full at sample k, and heading and speed there."""
+    """Note that thrust is full at sample k, with heading and speed there."""
     ready[READY_SAMPLE], ready[READY_HEADING], ready[READY_SPEED] = k, math.atan2(ux, uy), speed_mps
 
 
 @lean_kernel
 def _note_state(k: int, span: Span, row: Array, path: Array, ready: Array) -> None:
-    """Write sample k: that of a state."""
+    """Write sample k from a state."""
     path[k, 0], path[k, 1] = row[L.X], row[L.Y]
     if _is_ready(k, span, row[L.THRUST], ready):
         ready[READY_SAMPLE], ready[READY_SPEED] = k, row[L.SPEED]
@@ -157,7 +157,7 @@ def _note_state(k: int, span: Span, row: Array, path: Array, ready: Array) -> No
 
 @lean_kernel
 def _note_done(done: int, span: Span, row: Array, path: Array, ready: Array) -> tuple[int, int]:
-    """Write the sample of a state so many steps on, if there is one then; returns the next sample and the step."""
+    """Write the sample of the state ``done`` steps ahead, if one is due; return the next sample and the step."""
     step = done - 1
     k = step // span.stride
     if step % span.stride == 0:
@@ -167,7 +167,7 @@ def _note_done(done: int, span: Span, row: Array, path: Array, ready: Array) -> 
 
 @lean_kernel
 def _last_sample(span: Span, ready: Array) -> int:
-    """Last sample of a path, as far as it is known."""
+    """Return the last sample of a path, as far as it is known."""
     if ready[READY_SAMPLE] < 0.0:
         return span.samples
     return min(span.samples, max(span.least, int(ready[READY_SAMPLE]) + span.beyond))
@@ -175,15 +175,15 @@ def _last_sample(span: Span, ready: Array) -> int:
 
 @lean_kernel
 def trace_path(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path: Array, ready: Array) -> None:
-    """Write positions, m, along a manoeuvre: ``path[: span.samples + 1]``, or fewer, see ``least`` and ``beyond``.
+    """Write positions, m, along a manoeuvre to ``path[: span.samples + 1]``, or fewer, see ``least`` and ``beyond``.
 
     Args:
         params: platform row of the boat.
         row: state to start from; used up.
-        manoeuvre: what is carried out.
+        manoeuvre: the manoeuvre.
         span: what is written.
         path: shape (>= samples + 1, 2), float64.
-        ready: shape (3,), what is noted, see `READY_SAMPLE`.
+        ready: shape (3,), notes on the path, see `READY_SAMPLE`.
     """
     ready[READY_SAMPLE] = -1.0
     if params[L.KIND] == L.KIND_USV and params[L.ROTATE_SPEED] == 0.0:
@@ -203,7 +203,7 @@ def trace_path(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path
 
 @lean_kernel
 def _at_thrust(params: Array, thrust: float, most: float, dt_s: float) -> AtThrust:
-    """What hangs on the thrust alone of a step with the rudder at ``most``, percent."""
+    """Return what depends on thrust alone in a step with the rudder at ``most``, percent."""
     turn, straight_mps = turn_of_rudder(params, thrust, most, dt_s), speed_of_thrust(params, thrust)
     rudder = most * turn / turn if turn != 0.0 else most  # at no thrust nothing turns
     return AtThrust(thrust, turn, straight_mps, straight_mps * kept_share(params, rudder))
@@ -211,7 +211,7 @@ def _at_thrust(params: Array, thrust: float, most: float, dt_s: float) -> AtThru
 
 @lean_kernel
 def _turn_of_step(at: AtThrust, togo_deg: float, most: float, params: Array) -> tuple[float, float]:
-    """Turn of a step, deg, with so much to go, and the speed, m/s, that the boat tends to in it."""
+    """Return the turn of a step, deg, with ``togo_deg`` left, and the speed, m/s, that the boat tends to in it."""
     if not (togo_deg > 0.0 and at.thrust > 0.0):
         return 0.0, at.straight_mps
     if togo_deg < at.turn_deg:
@@ -221,11 +221,11 @@ def _turn_of_step(at: AtThrust, togo_deg: float, most: float, params: Array) -> 
 
 @lean_kernel
 def _trace_usv(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path: Array, ready: Array) -> None:
-    """`trace_path` for thrust boats: the same model in local variables, its heading kept as a unit vector.
+    """Do the work of `trace_path` for thrust boats: the same model in local variables, the heading as a unit vector.
 
-    The turn of a step is rudder, thrust and sign in one: the rudder held until less than such a step's turn is left,
-    then the one that ends on the mark. The boat moves along the mean heading, half a turn on from the old one.
-    By `sail` alone decisions take 1.4 times as long (42 scenes of 50 decisions), and differ by rounding.
+    The turn of a step combines rudder, thrust and sign. The rudder is held until less than a step's turn is left; the
+    last step ends on the mark. The boat moves along the mean heading of a step, half its turn from the old one. With
+    `sail` alone, decisions take 1.4 times as long (42 scenes of 50 decisions), and differ by rounding.
     """
     side, togo_deg, speed_mps, dt_s = manoeuvre.side, manoeuvre.togo_deg, manoeuvre.speed_mps, span.dt_s
     x, y, v = row[L.X], row[L.Y], row[L.SPEED]
@@ -281,7 +281,7 @@ def _trace_usv(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path
 
 @lean_kernel
 def _share_left(gained: float, before: float, earlier: float) -> float:
-    """What a step gained over what the one before did, where that had been the same; 0: it had not, or nothing was."""
+    """Return the ratio of the last two gains if it equals the ratio before; 0: it does not, or nothing was gained."""
     if not min(gained, before, earlier) > 0.0:
         return 0.0
     rate = gained / before
@@ -292,7 +292,7 @@ def _share_left(gained: float, before: float, earlier: float) -> float:
 def _settling(
     speed_mps: float, commanded_mps: float, gains: tuple[float, float, float], thrust: float, more_thrust: float
 ) -> Settling:
-    """How a straight run settles, by what its last three steps gained, m/s, and the last one's thrust; NaN: unknown."""
+    """Return how a straight run settles, by its last three gains, m/s, and its last thrust, percent; NaN: unknown."""
     gained, before, earlier = gains
     if abs(gained) + abs(more_thrust) < STEADY_SPEED:
         return Settling(speed_mps, 0.0, thrust, 0.0, 0.0, 0.0)
@@ -308,15 +308,15 @@ def _settling(
 
 @lean_kernel
 def _settles_at(speed_mps: float, end: Settling, params: Array) -> bool:
-    """Whether a run settles at that speed, with the thrust that keeps it: else it only seems to settle."""
+    """Return whether a run settles at that speed, with the thrust that holds it; else it only seems to settle."""
     off_mps = max(abs(end.speed_mps - speed_mps), abs(speed_of_thrust(params, end.thrust) - speed_mps))
     return end.short_mps > 0.0 and off_mps < SETTLED_MPS < speed_mps and end.thrust <= params[L.MAX_THRUST]
 
 
 @lean_kernel
 def _run_on(run: Straight, end: Settling, k: int, span: Span, path: Array, ready: Array) -> None:
-    """Fill the rest of a path, from sample k, with a straight run as its speed settles: that needs no model."""
-    left, missed_s = 1.0, 0.0  # of what it is short of, from sample to sample
+    """Fill the rest of a path, from sample k, with a straight run as its speed settles: this needs no model."""
+    left, missed_s = 1.0, 0.0  # share of the shortfall left after a sample; and its integral over one, s
     for _ in range(span.stride):
         left *= end.rate
         missed_s += left * span.dt_s
@@ -327,7 +327,7 @@ def _run_on(run: Straight, end: Settling, k: int, span: Span, path: Array, ready
         if end.fall_mps == 0.0:
             way_m += most_m - short_mps * missed_s
             short_mps *= left
-        else:  # evenly, until half of what is left is less
+        else:  # by a constant gain, until half of the shortfall is less
             for _ in range(span.stride):
                 short_mps = max(0.5 * short_mps, short_mps - end.fall_mps)
                 way_m += (end.speed_mps - short_mps) * span.dt_s

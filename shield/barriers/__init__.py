@@ -1,15 +1,15 @@
-"""Barriers h: margins, m, that are >= 0 while a boat on its backup manoeuvre keeps clear.
+"""Barriers h: margins, m, that are >= 0 while a boat on its backup manoeuvre stays clear.
 
-Each is asked about the path of a manoeuvre. `pursuit` and `value_function` tell a margin alone, the others write one
+Each is evaluated on the path of a manoeuvre. `pursuit` and `value_function` give a margin only. The others write one
 row (`clearance`): the margin h, m, the sample of the path where it is least, and dh/dx, dh/dy there (`registered` only
-where the program asks). `filter.qp` makes of `boats` and `static` the slopes by the commands of this step.
+where the QP needs them). From `boats` and `static`, `filter.qp` derives gradients by the commands of this step.
 
     boats             teammates on their manoeuvres, opponents that hold their course
-    pursuit           the worst opponent that pursues
-    value_function    the same, looked up in a value table
-    static            the worst of all that stays, and of registered barriers, over a path: each is a number with a
-                      margin and slope by place of its own, of a circle, wall or edge (`shapes`)
-    registered        other people's, see `register_barrier`
+    pursuit           the worst pursuing opponent
+    value_function    the worst opponent, looked up in a value table
+    static            the worst static constraint or registered barrier over a path; each has a number, and a margin
+                      and gradient by place: of a circle, wall or edge (`shapes`)
+    registered        barriers written by users, see `register_barrier`
 """
 
 from .registry import Barrier, register_barrier

@@ -1,7 +1,7 @@
-"""How near two boats come along sampled paths.
+"""Clearance of two boats along sampled paths.
 
-A result is the row ``(margin, sample, nx, ny)``: least distance minus radius in m, the sample (with the fraction of
-the way to the next) where it occurs, and the unit vector from the neighbour to the boat there.
+A result is the row ``(margin, sample, nx, ny)``: the least distance minus radius, m; the sample where it occurs, with
+the fraction of the way to the next; and the unit vector from the neighbour to the boat there.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ FAR = 1e6
 
 @lean_kernel
 def lower(out: Array, margin: float, k: int, nx: float, ny: float) -> None:
-    """Note a margin at sample k, with the unit vector away from what it is from, where it is the least."""
+    """Note a margin at sample k, with the unit vector away from its source, if it is the least so far."""
     if margin < out[MARGIN]:
         out[MARGIN], out[SAMPLE], out[NORMAL_X], out[NORMAL_Y] = margin, k, nx, ny
 
 
 @lean_kernel
 def nearest_on(x0: float, y0: float, x1: float, y1: float) -> tuple[float, float, float]:
-    """Where a straight way comes nearest to the origin: the part of it until then, and the place, m."""
+    """Find where a straight way comes nearest to the origin: the fraction of it until there, and that point, m."""
     dx, dy = x1 - x0, y1 - y0
     length = dx * dx + dy * dy
     part = 0.0
@@ -36,7 +36,7 @@ def nearest_on(x0: float, y0: float, x1: float, y1: float) -> tuple[float, float
 
 @lean_kernel
 def _note(out: Array, best: float, x0: float, y0: float, x1: float, y1: float, k: int) -> float:
-    """Least squared distance over a leg; noted in ``out`` when below ``best``."""
+    """Return the least squared distance over a leg, or ``best``; note it in ``out`` when below ``best``."""
     part, x, y = nearest_on(x0, y0, x1, y1)
     square = x * x + y * y
     if square < best:
@@ -47,7 +47,7 @@ def _note(out: Array, best: float, x0: float, y0: float, x1: float, y1: float, k
 
 @lean_kernel
 def _relative(own: Array, other: Array, course: Array, way: float, k: int) -> tuple[float, float]:
-    """Vector from the neighbour, which follows its path, or where that is empty its course, to the boat at sample k."""
+    """Return the vector to the boat at sample k from the neighbour: on its path, or if that is empty on its course."""
     if other.shape[0] > 0:
         return own[k, 0] - other[k, 0], own[k, 1] - other[k, 1]
     return own[k, 0] - course[0] - k * (way * course[2]), own[k, 1] - course[1] - k * (way * course[3])
@@ -64,20 +64,20 @@ def clear_of_course(
     search: tuple[float, ...],
     out: Array,
 ) -> None:
-    """Clearance from a neighbour whose way is known.
+    """Find the clearance from a neighbour whose way is known.
 
-    Samples that cannot bring the pair nearer than what is already known are skipped: in m samples the distance shrinks
-    by at most m times what it does in one. The search stops once the margin is below its floor, and margins above its
-    cap are told as that.
+    Samples that cannot bring the pair nearer than already found are skipped: in m samples the distance shrinks by at
+    most m times what it can in one. The search stops once the margin is below its floor. Margins above the cap are
+    reported as the cap.
 
     Args:
         own: the boat's path, m.
-        other: the neighbour's path, m; empty, (0, 2), where it holds its course:
-        course: (4,) its position at sample 0, m, and heading as a unit vector, and
-        way: how far it goes from sample to sample, m.
+        other: the neighbour's path, m; empty, (0, 2), if it holds its course.
+        course: (4,) then its position at sample 0, m, and its heading as a unit vector.
+        way: and how far it goes between samples, m.
         samples: last sample.
-        tail: samples for which both run straight on afterwards.
-        search: most the distance can shrink from sample to sample, radius to keep, floor and cap of margins, m.
+        tail: samples for which both continue straight on afterwards.
+        search: most the distance can shrink between samples, radius, floor and cap of margins, m.
         out: the result row.
     """
     closing_m, radius_m, floor_m, cap_m = search

@@ -1,7 +1,7 @@
-"""Margins that somebody else wrote, called by compiled code through their address: no decision is compiled for them.
+"""Margins of registered barriers, called by compiled code through their address: no decision is recompiled for them.
 
-Each is one compiled function, double f(x_m, y_m, ahead_s, values, size, part): its margin (part 0), m, or its gradient
-along x or y (1, 2); NaN where it raises.
+Each is one compiled function, double f(x_m, y_m, ahead_s, values, size, part). It returns the margin, m (part 0), or
+its gradient along x or y (parts 1, 2); NaN if it raises.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ..foreign import plain_text
 from .registry import Barrier
 
 DIFFERENCE_M = 0.05
-"""Half the distance over which a gradient is taken where none is given, m."""
+"""Half the distance of central differences where no gradient is given, m."""
 
 PLAIN = bool(getattr(config, "DISABLE_JIT", False))
 _NUMBER, _WHOLE = types.float64, types.int64
@@ -32,10 +32,10 @@ _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 
 
 def address_of(barrier: Barrier) -> int:
-    """Where compiled code finds a barrier's function, in this process.
+    """Return the address of a barrier's function in this process.
 
     Raises:
-        ConfigError: the compiler does not take it.
+        ConfigError: the compiler rejects the function.
     """
     if barrier not in _MADE:
         try:
@@ -49,14 +49,14 @@ def address_of(barrier: Barrier) -> int:
 
 
 def _why(error: Exception) -> str:
-    """What the compiler says, without its way there and its colours."""
+    """Return the compiler's message, without its trace and colours."""
     lines = [_COLOUR.sub("", line).strip() for line in str(error).splitlines()]
     said = [line for line in lines if line and not line.startswith("Failed in nopython mode")]
     return plain_text(said[0] if said else type(error).__name__)
 
 
 def _made(barrier: Barrier) -> tuple[int, Any]:
-    """Address of a barrier's compiled function, and what keeps it alive."""
+    """Return the address of a barrier's compiled function, and the object that keeps it alive."""
     options: Any = {} if PLAIN else {"nogil": True, "error_model": "numpy", "boundscheck": True}
     compiled = (lambda function: function) if PLAIN else njit(**options)
     function = _parts_of(compiled(barrier.margin), barrier.slope and compiled(barrier.slope), compiled)
@@ -71,7 +71,7 @@ def _made(barrier: Barrier) -> tuple[int, Any]:
 
 
 def _parts_of(margin: Any, slope: Any, compiled: Callable[[Any], Any]) -> Any:
-    """The margin of a barrier, or its gradient along x or y, in one function."""
+    """Return one function for the margin of a barrier and its gradient along x or y."""
     h = DIFFERENCE_M
 
     def differences(x: float, y: float, ahead: float, values: Any) -> tuple[float, float]:
@@ -115,4 +115,4 @@ def _call_plain(address: int, x: float, y: float, ahead: float, values: Any, siz
 
 
 call: Any = _call_plain if PLAIN else _call
-"""``call(address, x_m, y_m, ahead_s, values, size, part)``: what a barrier's function says, from compiled code."""
+"""``call(address, x_m, y_m, ahead_s, values, size, part)``: the result of a barrier's function, in compiled code."""

@@ -1,7 +1,7 @@
-"""Registered barriers h(x, t): somebody else's, called by compiled code; they count as obstacles do, which stop a boat.
+"""Registered barriers h(x, t), written by users and called by compiled code; like obstacles, they stop a boat.
 
-What is no number counts as `LOST_M`: nobody knows what is there. Where nothing is known of the boat's own place, paths
-say nothing of the barrier, and the boat is to stop, see `unknown_at`. How often that was so is noted, and said.
+A margin that is not a number counts as `LOST_M`: nothing is known there. Where the margin at the boat's own place is
+unknown, the barrier does not affect paths and the boat is to stop, see `unknown_at`. Faults are counted and logged.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from .pointer import address_of, call
 from .registry import get_barrier
 
 LOST_M = -100.0
-"""Margin, m, where a barrier gives none that can be used."""
+"""Margin, m, where a barrier gives no usable one."""
 DEEPEST_M = -99.0
-"""Margins below this count as it, m."""
+"""Lower margins count as this, m."""
 STEEPEST = 10.0
-"""Gradients beyond this, m per m, are no distance's."""
+"""Gradients beyond this, m per m, are not those of a distance."""
 
 
 @lean_kernel
 def _ask(b: int, x: float, y: float, ahead_s: float, part: int, registered: Registered) -> float:
-    """Margin of barrier b (part 0), or its gradient along x or y (1, 2), at a place so long from now."""
+    """Return the margin of barrier b (part 0) or its gradient along x or y (1, 2) at a place, ``ahead_s`` from now."""
     if registered.size[b] < 0:
         return math.nan
     ahead_s += registered.late_s
@@ -37,7 +37,7 @@ def _ask(b: int, x: float, y: float, ahead_s: float, part: int, registered: Regi
 
 @lean_kernel
 def margin_of(b: int, x: float, y: float, ahead_s: float, registered: Registered) -> float:
-    """Margin of barrier b, m, less how far off a boat may be; `LOST_M` where there is none."""
+    """Return the margin of barrier b, m, less how far off a boat may be; `LOST_M` where there is none."""
     h = _ask(b, x, y, ahead_s, 0, registered)
     if math.isnan(h):
         registered.faults[b] += 1
@@ -47,7 +47,7 @@ def margin_of(b: int, x: float, y: float, ahead_s: float, registered: Registered
 
 @lean_kernel
 def unknown_at(i: int, scene: Scene) -> int:
-    """First barrier that gives no margin where boat i is, -1 for none: what was nominal for it rests on nothing."""
+    """Return the first barrier without a margin where boat i is, -1 for none; there no command can be checked."""
     state, registered = scene.state, scene.static.registered
     for b in range(registered.address.shape[0]):
         if margin_of(b, state[i, L.X], state[i, L.Y], 0.0, registered) <= LOST_M:
@@ -57,9 +57,9 @@ def unknown_at(i: int, scene: Scene) -> int:
 
 @lean_kernel
 def write_slope(b: int, i: int, slot: int, scene: Scene, out: Array) -> None:
-    """Write the gradient of barrier b at the sample of a clearance row; one that is none, or far too steep, as 0.
+    """Write the gradient of barrier b at the sample of a clearance row; 0 where there is none, or it is far too steep.
 
-    It only helps the program to propose: what is proposed is checked by margins.
+    It only helps the QP to propose a command: proposals are checked by margins.
     """
     registered, path = scene.static.registered, scene.path[slot]
     k = int(out[SAMPLE])
@@ -72,15 +72,15 @@ def write_slope(b: int, i: int, slot: int, scene: Scene, out: Array) -> None:
 
 
 class RegisteredBarriers:
-    """The registered barriers that a shield keeps, renewed before every decision.
+    """The registered barriers of a shield, renewed before every decision.
 
     Args:
-        names: of them.
+        names: their names.
         off_m: how far off a boat may be, and how much a margin may fall short between two samples of a path, m.
-        late_s: time until the moment that is decided for, s.
+        late_s: time until the commands take effect, s.
 
     Raises:
-        ConfigError: there is none of that name in this process.
+        ConfigError: a name is not registered in this process, or the compiler rejects its function.
     """
 
     def __init__(self, names: tuple[str, ...], off_m: float, late_s: float) -> None:
@@ -89,7 +89,7 @@ class RegisteredBarriers:
             address_of(get_barrier(name))  # compiled now, not in the first decision
 
     def renew(self) -> None:
-        """Write what the barriers are given now, and their addresses; of one that cannot say it, nothing is known."""
+        """Write the barriers' present values and their addresses; a barrier that fails to give values is unknown."""
         arrays = self.arrays
         for b, name in enumerate(self.names):
             barrier = get_barrier(name)
@@ -104,7 +104,7 @@ class RegisteredBarriers:
                 arrays.values[b, : len(values)] = values
 
     def tell(self) -> None:
-        """Log, once for each, which barriers gave no usable margin in the last decision."""
+        """Log, once for each, the barriers that gave no usable margin in the last decision."""
         if not self.names:
             return
         for name, faults in zip(self.names, self.arrays.faults, strict=True):

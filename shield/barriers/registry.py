@@ -1,4 +1,4 @@
-"""Barriers of other people's: what a `Barrier` is, and which there are by name."""
+"""Registered barriers, written by users: what a `Barrier` is, and the barriers known by name."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ class Barrier:
     """A function h of place and time that boats keep >= 0, such as the distance from a ferry's domain.
 
     Attributes:
-        name: what it is known by.
-        margin: h(x_m, y_m, ahead_s, values), m, of a boat's centre at a place, m east and north, so many seconds from
-            now. It falls by no more than 1 m in a metre, as a distance does; beyond 50 m it may be anything, as +inf.
-        slope: (dh/dx, dh/dy) of the same; None: central differences of the margin.
-        values: numbers both are given, as a float64 array: where the ferry is, say. Or a function, asked before every
-            decision, that gives as many each time. All that changes has to come by them: the compiler takes whatever
-            else a function reads to be constant.
+        name: its name in `ShieldConfig.barriers`.
+        margin: h(x_m, y_m, ahead_s, values), m, of a boat's centre at x, y m east and north, ``ahead_s`` seconds from
+            now. It falls by at most 1 m per metre, as a distance does. Beyond 50 m it may be anything, such as +inf.
+        slope: (dh/dx, dh/dy), with the same arguments; None: central differences of the margin.
+        values: numbers passed to both as a float64 array, such as the ferry's position. Or a function that is called
+            before every decision and returns as many each time. Everything that changes must come through them: the
+            compiler takes whatever else a function reads as constant.
 
     Raises:
-        ConfigError: the name is none, or something is no function.
+        ConfigError: the name is not an identifier, something is no function, or the values cannot be used.
     """
 
     name: str
@@ -54,10 +54,10 @@ class Barrier:
             object.__setattr__(self, "values", tuple(self.now().tolist()))
 
     def now(self) -> Array:
-        """The numbers of this moment.
+        """Return the numbers of this moment.
 
         Raises:
-            ConfigError: they are none, not finite, or too many.
+            ConfigError: they are no numbers, not finite, or too many.
         """
         given = self.values() if callable(self.values) else self.values
         try:
@@ -74,13 +74,13 @@ BARRIERS: dict[str, Barrier] = {}
 
 
 def register_barrier(barrier: Given) -> Given:
-    """Make a barrier known by its name, in this process; a decorator, too, of a function that builds one.
+    """Register a barrier under its name in this process; also a decorator of a function that builds one.
 
     Returns:
-        What was given.
+        The argument.
 
     Raises:
-        ConfigError: another barrier has that name, or it is no barrier.
+        ConfigError: another barrier has that name, or the argument is no barrier.
     """
     found = barrier if isinstance(barrier, Barrier) else barrier() if callable(barrier) else barrier
     if not isinstance(found, Barrier):
@@ -92,7 +92,7 @@ def register_barrier(barrier: Given) -> Given:
 
 
 def get_barrier(name: str) -> Barrier:
-    """The barrier of that name.
+    """Return the barrier of that name.
 
     Raises:
         ConfigError: there is none.

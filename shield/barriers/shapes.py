@@ -1,4 +1,4 @@
-"""Margins of the shapes that static constraints have: circles, walls, the sides of a field, and all of it."""
+"""Margins and gradients of the shapes of static constraints: circles, walls, the sides of a field, and all of it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ..jit import Array, lean_kernel
 
 @lean_kernel
 def to_circle(x: float, y: float, circle: Array) -> tuple[float, float, float]:
-    """Distance, m, from a circle (negative inside) and its slope, the unit vector away from it."""
+    """Return the distance from a circle, m (negative inside), and its gradient, the unit vector away from it."""
     dx, dy = x - circle[0], y - circle[1]
     distance = math.sqrt(dx * dx + dy * dy)
     if distance <= 1e-9:
@@ -19,7 +19,7 @@ def to_circle(x: float, y: float, circle: Array) -> tuple[float, float, float]:
 
 @lean_kernel
 def to_wall(x: float, y: float, wall: Array, obstacle_clearance_m: float) -> tuple[float, float, float]:
-    """Distance, m, from what is within the clearance of a wall, and its gradient, the unit vector away from it."""
+    """Return the distance from a wall less the clearance, m, and its gradient, the unit vector away from it."""
     dx, dy = wall[2] - wall[0], wall[3] - wall[1]
     length = dx * dx + dy * dy
     part = 0.0
@@ -34,13 +34,13 @@ def to_wall(x: float, y: float, wall: Array, obstacle_clearance_m: float) -> tup
 
 @lean_kernel
 def _side(x: float, y: float, ax: float, ay: float, bx: float, by: float) -> float:
-    """On which side of the line from a to b a point is: positive left, negative right."""
+    """Return on which side of the line from a to b a point is: positive left, negative right."""
     return (bx - ax) * (y - ay) - (by - ay) * (x - ax)
 
 
 @lean_kernel
 def goes_through(x0: float, y0: float, x1: float, y1: float, wall: Array) -> bool:
-    """Whether the way from one point to another goes through a wall."""
+    """Return whether the way from one point to another crosses a wall."""
     ax, ay, bx, by = wall
     if (_side(x0, y0, ax, ay, bx, by) > 0.0) == (_side(x1, y1, ax, ay, bx, by) > 0.0):
         return False
@@ -49,9 +49,10 @@ def goes_through(x0: float, y0: float, x1: float, y1: float, wall: Array) -> boo
 
 @lean_kernel
 def to_rectangle(x: float, y: float, field: Array) -> tuple[float, float, float]:
-    """How far inside a rectangle (left, low, right, high) a point is, m, and its slope.
+    """Return how far inside a rectangle (left, low, right, high) a point is, m, and the gradient.
 
-    Outside that is the distance to the rectangle, negative, and the slope leads there; inside no slope is told.
+    Outside, it is minus the distance to the rectangle, and the gradient points there. Inside, the gradient is given as
+    0.
     """
     dx = max(0.0, field[0] - x) - max(0.0, x - field[2])
     dy = max(0.0, field[1] - y) - max(0.0, y - field[3])
@@ -63,7 +64,7 @@ def to_rectangle(x: float, y: float, field: Array) -> tuple[float, float, float]
 
 @lean_kernel
 def to_side(x: float, y: float, side: int, field: Array) -> tuple[float, float, float]:
-    """How far inside one side of a rectangle (left, low, right, high) a point is, m, and its slope.
+    """Return how far inside one side of a rectangle (left, low, right, high) a point is, m, and the gradient.
 
     Infinite where there is no edge.
     """

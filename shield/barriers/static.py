@@ -1,21 +1,21 @@
-"""What of the static constraints and registered barriers concerns a boat on a manoeuvre, and when.
+"""Barriers of static constraints and registered barriers, along the path of a manoeuvre.
 
-They have numbers. First come those that stop a boat: circles, walls, registered barriers; then those kept by rule:
-keep-out circles, and the sides of the field. The number after the last stands for the field as one.
+Constraints are numbered. First come those that stop a boat: circles, walls, registered barriers. Then come the rules:
+keep-out circles and the sides of the field. The number after the last stands for the field as a whole.
 
-Who is stopped is caught: an obstacle that is touched before a half turn could be over counts before what pursuers may
-do. Later ones leave time for another manoeuvre, and count with what is kept by rule. So does what a current of unknown
-direction may do by then, a distance that grows with time; its drift of a moment, which static constraints are widened
-by, comes before pursuers.
+A stopped boat is caught. So an obstacle that is touched before a half turn could be over counts before pursuing
+opponents. Later obstacles leave time for another manoeuvre; they count with the rules. The drift in a current of
+unknown direction is split alike. Static constraints are widened by the drift of one moment, which counts before
+pursuers. The drift that grows along a path counts with the rules.
 
-Samples of a path that cannot lower the clearance found so far are skipped: in m samples it shrinks by at most m times
-the way the boat goes from sample to sample, its drift included. Registered barriers, which may move, are asked at
-every one. From sample to sample a boat may go from before a wall to behind it, and be near it at neither: who goes
-through a wall is behind it from there on, by as much as it is off it.
+Samples that cannot lower the clearance found so far are skipped: in m samples it shrinks by at most m times the boat's
+way between samples, drift included. Registered barriers may move, so they are evaluated at every sample. Between two
+samples a boat may cross a wall and be near it at neither. From there on it is behind the wall, by its distance from
+it.
 
-A boat beyond something kept by rule has to come back. However a path leads, it does not keep the rule; what it leads to
-tells paths apart. They are followed straight on from their end: those that lead back are worth most, even if they lead
-farther out at first, since lying still outside is none; of those, the one that goes out least.
+A boat beyond a rule must come back. No path satisfies the rule then, so paths are compared by where they lead: each is
+continued straight on from its end. Paths that lead back score best, even if they lead farther out at first, because a
+boat that lies still outside does not return. Among them, the one that leads out least is best.
 """
 
 from __future__ import annotations
@@ -31,63 +31,59 @@ from .registered import LOST_M, margin_of
 from .shapes import goes_through, to_circle, to_rectangle, to_side, to_wall
 
 STATIC = -2
-"""In the place of the active neighbour: an obstacle, an edge or a circle is; below, registered barriers."""
+"""Active constraint: an obstacle, an edge or a circle. Lower numbers are registered barriers."""
 SIDES = 4
-"""Sides of a field: the last numbers."""
+"""Number of sides of a field; they have the last numbers."""
 LEAVE_S = 0.5
-"""Time constant with which a boat too near to an obstacle has to come away from it where there may be a current, s."""
+"""Time constant with which a boat too near to an obstacle must move away where there may be a current, s."""
 RETURN_S, RETURN_PARTS = 10.0, 5
-"""How long a path is followed straight on from its end, s, and in how many parts."""
+"""For how long a path is continued straight on from its end, s, and in how many parts."""
 HOME_M = 1.0
-"""A path that leads so far inside by then leads back, m."""
+"""A continued path that gets this far inside leads back, m."""
 FARTHEST_M = 100.0
-"""Boats farther outside are looked at as if they were that far, m: what tells their paths apart is the same."""
+"""Boats farther outside are treated as if at this distance, m: their paths differ by the same."""
 RETURN_WORTH, DIP_WORTH = 0.01, 0.002
-"""What counts beside a metre that the boat is outside now: a metre that a path ends short of home, and one by which it
-leads farther out at first (5 m of that as much as to stay just outside)."""
+"""Penalties per metre, where a metre that the boat is outside now counts 1: ending short of home, and leading farther
+out at first (5 m of that equal staying just outside)."""
 
 
 class Sampling(NamedTuple):
     """How a path is sampled, and how far a boat gets from sample to sample."""
 
     near: int  # sample at which a half turn could be over
-    side: int  # last sample at which the sides of the field are looked at
+    side: int  # last sample at which the sides of the field are checked
     last: int  # last sample
     first_s: float  # time until the first sample, s
     sample_s: float  # time from sample to sample, s
-    way_m: float  # most the boat moves through the water from sample to sample, m
-    drift_m: float  # most a current carries it meanwhile, m
-    grace: float  # factor per sample on what is excused of a boat that is too near to an obstacle, see `_clearance`
+    way_m: float  # most the boat moves through the water between samples, m
+    drift_m: float  # most a current carries it between samples, m
+    grace: float  # factor per sample on the excuse of a boat too near to an obstacle, see `_clearance`
 
 
 @lean_kernel
 def about(barrier: int) -> int:
-    """What is active, in the place of a neighbour: the registered barrier of that number; -1: something else static.
-
-    The same turns it back into the number.
-    """
+    """Return the active-constraint number of a registered barrier (-1: other static constraints); its own inverse."""
     return STATIC - 1 - barrier
 
 
 @lean_kernel
 def count_obstacles(static: Static) -> int:
-    """How many constraints stop a boat."""
+    """Return the number of constraints that stop a boat."""
     return static.circles.shape[0] + static.segments.shape[0] + static.registered.address.shape[0]
 
 
 @lean_kernel
 def registered_number(o: int, static: Static) -> int:
-    """Which registered barrier constraint number o is, -1: none."""
+    """Return which registered barrier constraint o is; -1 for none."""
     b = o - static.circles.shape[0] - static.segments.shape[0]
     return b if 0 <= b < static.registered.address.shape[0] else -1
 
 
 @lean_kernel
 def margin_at(o: int, x: float, y: float, ahead_s: float, static: Static) -> tuple[float, float, float]:
-    """Margin, m, of constraint number o at a place so long from now, and its slope.
+    """Return the margin, m, of constraint o at a place, ``ahead_s`` from now, and its gradient.
 
-    The slope of registered barriers is told as 0: it is asked for only where it is needed, see
-    `registered.write_slope`.
+    The gradient of registered barriers is returned as 0: `registered.write_slope` finds it only where it is needed.
     """
     circles, walls = static.circles.shape[0], static.segments.shape[0]
     if o < circles:
@@ -105,13 +101,13 @@ def margin_at(o: int, x: float, y: float, ahead_s: float, static: Static) -> tup
 
 @lean_kernel
 def _sampling(i: int, drift_m: float, scene: Scene) -> Sampling:
-    """How paths of boat i are sampled.
+    """Return how paths of boat i are sampled.
 
-    Sides of the field are looked at to the end of them. Not by who may be pursued: every long straight run ends beyond
-    a side, and of these it has none to spare; it looks until a half turn could be over, which is made when it is time.
+    Sides of the field are checked along whole paths, except for a boat that may be pursued. Every long straight run
+    ends beyond a side, and such a boat has none to spare. For it, sides count until a half turn could be over.
 
-    Where there may be a current less and less is excused: asked only to come no nearer than it is, a boat would be
-    carried in a little in every step.
+    Where there may be a current, the excuse of a boat too near to an obstacle shrinks along the path. If the boat only
+    had to come no nearer, a current would carry it in a little in every step.
     """
     boats = scene.boats
     return Sampling(
@@ -130,11 +126,11 @@ def _sampling(i: int, drift_m: float, scene: Scene) -> Sampling:
 def _clearance(
     o: int, now_m: float, last: int, here: Array, path: Array, sampling: Sampling, static: Static, out: Array
 ) -> bool:
-    """Lower a clearance row to that from constraint number o until sample ``last``; whether it was lower.
+    """Lower a clearance row to that from constraint o until sample ``last``; return whether it was lowered.
 
-    A boat that is already too near to an obstacle has to come no nearer: its clearance there counts from where it is.
-    With ``grace`` below 1 it has to come away as well: what it is short of now is excused less from sample to sample.
-    Going through a wall is not excused, unless it is not known which side of it the boat is on.
+    A boat that is already too near to an obstacle must come no nearer: its clearance counts from its present one. With
+    ``grace`` below 1 it must also move away: its present shortfall is excused less from sample to sample. Crossing a
+    wall is not excused, unless it is unknown on which side of it the boat is.
     """
     drift_m, obstacle_clearance_m, wall = sampling.drift_m, static.segment_m, o - static.circles.shape[0]
     is_wall, moves = 0 <= wall < static.segments.shape[0], registered_number(o, static) >= 0
@@ -144,7 +140,7 @@ def _clearance(
     lowered, behind, x, y, k = False, False, here[0], here[1], 0
     while k <= last:
         margin, nx, ny = margin_at(o, path[k, 0], path[k, 1], sampling.first_s + k * sampling.sample_s, static)
-        near_m = margin + obstacle_clearance_m if is_wall else FAR  # a wall farther off is not gone through
+        near_m = margin + obstacle_clearance_m if is_wall else FAR  # a wall farther off is not crossed
         if is_wall and known and goes_through(x, y, path[k, 0], path[k, 1], static.segments[wall]):
             behind = not behind
         if behind:
@@ -162,7 +158,7 @@ def _clearance(
 
 @lean_kernel
 def _clear_of_sides(here: Array, path: Array, sampling: Sampling, static: Static, out: Array) -> None:
-    """Lower a clearance row to that from the sides of the field, but those that the boat is beyond."""
+    """Lower a clearance row to that from the sides of the field, except those that the boat is beyond."""
     for side in range(SIDES):
         margin_m, nx, ny = to_side(here[0], here[1], side, static.field)
         if margin_m < 0.0 or margin_m == math.inf:
@@ -174,7 +170,7 @@ def _clear_of_sides(here: Array, path: Array, sampling: Sampling, static: Static
 
 @lean_kernel
 def _way_back(o: int, now_m: float, path: Array, sampling: Sampling, static: Static) -> float:
-    """Clearance, m, negative, of a path of a boat that is beyond constraint number o, by ``now_m`` < 0."""
+    """Return the clearance, m, negative, of a path of a boat that is beyond constraint o (``now_m`` < 0)."""
     last, first_s, least_m, most_m = sampling.last, sampling.first_s, FAR, -FAR
     for k in range(last + 1):
         at_s = first_s + k * sampling.sample_s
@@ -196,13 +192,13 @@ def clear_of_constraints(
 ) -> int:
     """Lower a clearance row to the least from all constraints, or from those that stop a boat and are near in time.
 
-    Of a boat beyond something kept by rule what a path is worth as a way back is told. Of the field that is the way to
-    all of it: of each side alone, a boat beyond a corner of it would turn to and fro. Of a keep-out circle that is less
-    what the path would break of the rest, which else counted for nothing beside how deep the boat is in it. Paths say
-    nothing of a barrier of which nothing is known where the boat is, see `registered.unknown_at`.
+    For a boat beyond a rule the row tells how well the path leads back. The field counts as a whole here: with each
+    side alone, a boat beyond a corner would turn to and fro. For a keep-out circle, the path's violation of other
+    constraints is added; otherwise it would not count beside the boat's depth in the circle. A barrier that is unknown
+    at the boat's place does not affect paths, see `registered.unknown_at`.
 
     Returns:
-        What the least is from: `STATIC`, or below it the barrier, see `about`.
+        The active constraint: `STATIC`, or below it a registered barrier, see `about`.
     """
     active, beyond, back_m = -1, -1, 0.0
     obstacles = count_obstacles(static)
@@ -236,9 +232,9 @@ def clear_of_constraints(
 
 @lean_kernel
 def clear_of_static(i: int, slot: int, scene: Scene, out: Array) -> int:
-    """Clearance row of boat i on the path in ``slot`` from all static constraints and registered barriers.
+    """Find the clearance row of boat i on the path in ``slot`` from all static constraints and registered barriers.
 
-    Returns what the least is from, see `clear_of_constraints`.
+    Returns the active constraint, see `clear_of_constraints`.
     """
     out[MARGIN] = FAR
     sampling = _sampling(i, scene.static.current_mps * scene.boats.sample_s, scene)
@@ -247,12 +243,12 @@ def clear_of_static(i: int, slot: int, scene: Scene, out: Array) -> int:
 
 @lean_kernel
 def clear_of_near_obstacles(i: int, slot: int, scene: Scene, most_m: float, out: Array) -> int:
-    """The same from obstacles and registered barriers alone until a half turn could be over, ``most_m`` at most."""
+    """Find the same from obstacles and registered barriers until a half turn could be over; at most ``most_m``."""
     out[MARGIN] = most_m
     return clear_of_constraints(True, scene.state[i], scene.path[slot], _sampling(i, 0.0, scene), scene.static, out)
 
 
 @lean_kernel
 def beyond_line(i: int, scene: Scene) -> bool:
-    """Whether boat i is beyond the hard line, and that stops boats."""
+    """Return whether boat i is beyond a hard line that stops boats."""
     return to_rectangle(scene.state[i, L.X], scene.state[i, L.Y], scene.static.line)[0] < 0.0

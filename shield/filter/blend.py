@@ -20,7 +20,7 @@ TURN, SPEED, HEADING, SATISFIED, SCORE = range(5)
 """Columns of ``scene.verified``."""
 
 LITTLE_M = 0.001
-"""What an answer of the program may cost a boat in a step, m: its rows are linear, and hardly one costs nothing."""
+"""Largest margin that an answer of the QP may cost a boat in a step, m: rows are linear, so it seldom costs nothing."""
 
 
 @lean_kernel
@@ -82,7 +82,7 @@ def costs_at_most(most_m: float, scene: Scene) -> bool:
 
 
 TRIALS = 3
-"""Looks for the least share of a backup, the first at none of it: to a quarter of the way."""
+"""Trials of the line search; the first is the nominal command. They resolve a quarter of the way."""
 
 
 @lean_kernel

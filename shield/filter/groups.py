@@ -12,7 +12,7 @@ from ..jit import lean_kernel
 from ..workspace import Scene
 
 NOT_OURS, NONE, NOT_YET = -1, -2, -3
-"""Boats of no group: not ours; of those whose nominal commands keep everything; not looked at yet."""
+"""Group numbers of other boats; of groups whose nominal commands satisfy everything; of boats not yet checked."""
 
 
 @lean_kernel

@@ -24,13 +24,13 @@ from .backup_switch import command_backup
 from .nominal import predict
 
 AT_REST_MPS = 0.05
-"""Speed below which a boat is taken to lie still, m/s."""
+"""Speed below which a boat counts as stopped, m/s."""
 
 ROUNDING_M = 1e-6
-"""A boat that is too near already may come nearer by this, m."""
+"""A boat that is already too near may come nearer by this, m."""
 
 LONGEST_STOP_S = 90.0
-"""Time after which a boat that is told to stop is taken to lie still, s."""
+"""Time after a stop command at which a boat counts as stopped, s."""
 
 
 @lean_kernel

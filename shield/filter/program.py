@@ -1,8 +1,8 @@
-"""The quadratic program through qpsolvers: build, solve, re-check.
+"""The QP solved by a backend of qpsolvers, with a re-check of the answer.
 
     minimise 1/2 |z - z0|^2   subject to   C z >= d
 
-with scaled inputs z (see `qp`). An answer counts only when it satisfies every row by our own residuals.
+with scaled inputs z (see `qp`). An answer counts only if it satisfies every row by residuals computed here.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ..jit import Array
 logger = logging.getLogger(__name__)
 
 COMPILED = "active_set"
-"""The solver of our own, `qp.project`; the others are names of qpsolvers."""
+"""The compiled solver, `qp.project`; other names are those of qpsolvers."""
 
 ROW_TOLERANCE = 1e-4
 """Largest accepted violation of a unit-length row; the exact check of the command follows anyway."""
@@ -32,41 +32,41 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "proxqp": {"eps_abs": 1e-8, "check_duality_gap": True, "eps_duality_gap_abs": 1e-8, "max_iter": 1000},
     "scs": {"eps_abs": 1e-7, "eps_rel": 1e-7},
 }
-"""Settings under which a backend meets `ROW_TOLERANCE`; the others do at their defaults."""
+"""Settings with which a backend meets `ROW_TOLERANCE`; other backends meet it with their defaults."""
 
 
 @dataclass(frozen=True)
 class Program:
-    """A program min 1/2 |z - z0|^2, C z >= d: rows C of unit length, (rows, n), d (rows,), wanted inputs z0 (n,)."""
+    """The QP min 1/2 |z - z0|^2, C z >= d: rows C of unit length, (rows, n), d (rows,), nominal inputs z0 (n,)."""
 
     C: Array
     d: Array
     z0: Array
 
     def holds(self, z: Array, tolerance: float = ROW_TOLERANCE) -> bool:
-        """Whether every row of C z >= d - tolerance holds; written so that NaN fails."""
+        """Return whether every row of C z >= d - tolerance holds; written so that NaN fails."""
         with np.errstate(all="ignore"):
             return bool((self.C @ z >= self.d - tolerance).all())
 
 
 Solver = Callable[[Program], Array | None]
-"""What answers a program, or says None."""
+"""Solves a QP, or returns None."""
 
 
 def solver_of(name: str) -> Solver | None:
-    """The backend of qpsolvers of that name; None for the compiled solver."""
+    """Return the backend of qpsolvers of that name; None for the compiled solver."""
     return None if name == COMPILED else partial(solve, solver=name)
 
 
 def check_solver(name: str) -> None:
-    """Check that a QP solver is there: the compiled one is, a backend of qpsolvers must be installed.
+    """Check that a QP solver is available: the compiled one is, a backend of qpsolvers must be installed.
 
     Raises:
         SolverError: it is not; the message lists those that are.
     """
     if name == COMPILED:
         return
-    import qpsolvers  # it and scipy take a quarter of a second, which the compiled solver does not need
+    import qpsolvers  # importing it and scipy takes 0.25 s; the compiled solver needs neither
 
     if name not in qpsolvers.available_solvers:
         raise SolverError(
@@ -76,9 +76,9 @@ def check_solver(name: str) -> None:
 
 
 def solve(program: Program, solver: str) -> Array | None:
-    """Answer of the program, shape (n,), or None when the backend finds none that passes our own check.
+    """Return the solution of the QP, shape (n,), or None if the backend finds none that passes the re-check.
 
-    Fails closed: a backend that raises, or answers anything but n numbers that satisfy every row, has no answer.
+    Fails closed: a backend that raises, or returns anything but n numbers that satisfy every row, has no solution.
     """
     if not all(np.isfinite(numbers).all() for numbers in (program.C, program.d, program.z0)):
         return None  # some backends take half a minute over these
@@ -88,12 +88,12 @@ def solve(program: Program, solver: str) -> Array | None:
     kind = np.asarray if solver in qpsolvers.dense_solvers else csc_matrix
     weight, rows, options = kind(np.eye(len(program.z0))), kind(-program.C), OPTIONS.get(solver, {})
     try:
-        with warnings.catch_warnings():  # some also warn of programs without an answer: that is read from the answer
+        with warnings.catch_warnings():  # some warn of infeasible QPs: the answer shows that
             warnings.simplefilter("ignore")
             answer = qpsolvers.solve_qp(weight, -program.z0, rows, -program.d, solver=solver, **options)
     except (qpsolvers.exceptions.QPError, ValueError, ArithmeticError):
         return None
-    except Exception as error:  # whatever goes wrong in foreign code, the ladder takes over
+    except Exception as error:  # foreign code may raise anything; the backups remain
         logger.warning("QP solver %s failed (%s: %s)", solver, type(error).__name__, error)
         return None
     if not isinstance(answer, np.ndarray) or answer.shape != program.z0.shape or answer.dtype != np.float64:

@@ -1,21 +1,21 @@
-"""The quadratic program between teammates: the least change that leaves every boat what its backup satisfies.
+"""The QP among teammates: the command nearest to the nominal one with which boats satisfy what their backups satisfy.
 
     minimise 1/2 |z - z0|^2   subject to   C z >= d
 
 Scaled inputs of boat i: z_t = turn / full turn of this step (deg), z_s = sqrt(speed_weight) * speed / top speed. With
 manoeuvre and closest point fixed (envelope theorem), turning a boat by d(psi) in this step rotates its whole path about
-its next position, and d(v) stretches it, so with n the unit vector from neighbour to boat at the closest point and r
-the boat's path from its next position to there,
+its next position, and d(v) stretches it. Let n be the unit vector from neighbour to boat at the closest point, and r
+the boat's path from its next position to there. Then
 
     dh/dpsi = n . (r_y, -r_x)   (psi clockwise),     dh/dv = n . r / v,
 
-and a row is the discrete-time CBF condition h(x+) >= target, linearised about the candidate command, where the target
-is what the class-K rate asks for, or what the backups keep if that is more:
+and a row is the discrete-time CBF condition h(x+) >= target, linearised about the candidate command. The target is the
+margin required by the class-K rate, or that of the backups if it is larger:
 
     h + dh/dpsi_i (psi_i - psi_i') + dh/dv_i (v_i - v_i') >= target,
 
-less the same terms of a teammate j, for whom n points the other way. Least changes are for those who decide with us,
-and whom no opponent is in the way of; see `backup_switch`. The answer counts if the exact check says so.
+less the same terms of a teammate j, for whom n points the other way. The QP is only for own boats that no opponent
+blocks, see `backup_switch`. An answer is sent only after the exact check.
 """
 
 from __future__ import annotations
@@ -40,16 +40,15 @@ STATIC_AIM_M = 1e-3
 SLOW_MPS = 0.3
 """Below this speed dh/dv is taken as at this speed."""
 NEAR_OBSTACLES, ALL_STATIC, LIMITS = -1, -2, -3
-"""What a row is about, where that is no boat: obstacles near in time, all static constraints, or the inputs' own
-limits."""
+"""What a row is about if not a boat: obstacles near in time, all static constraints, or limits of the inputs."""
 ROUNDS = 2
-"""Times the program is linearised and solved anew before the backups stand."""
+"""Rounds of linearising and solving before the backups are sent."""
 SAME = 1e-6
 """Scaled input change below which a command counts as unchanged and the nominal one is sent."""
 SWEEPS = 200
-"""Passes over the rows after which a program counts as having no answer."""
+"""Passes over the rows after which a QP counts as infeasible."""
 STILL, HOLDS = 1e-9, 1e-6
-"""A pass that changes no multiplier by more is the last; and by how much a row may be violated then."""
+"""Change of multipliers below which a pass is the last, and the largest violation of a row then."""
 
 
 @lean_kernel
@@ -63,17 +62,17 @@ def _dot(a: Array, b: Array) -> float:
 
 @lean_kernel
 def project(C: Array, d: Array, z0: Array, z: Array, dual: Array) -> bool:
-    """Nearest point to ``z0`` with ``C z >= d``, by Hildreth's method (1957): row by row, until none moves it.
+    """Find the nearest point to ``z0`` with ``C z >= d``, by Hildreth's method (1957): row by row, until none moves it.
 
     Args:
         C: (rows, n), rows of unit length.
         d: (rows,).
         z0: (n,).
-        z: (n,), the answer.
+        z: (n,), the solution.
         dual: (rows,), its multipliers.
 
     Returns:
-        Whether there is an answer; False also where a row is not made of numbers.
+        Whether there is a solution; False also if a row is not finite.
     """
     copy_row(z, z0)
     dual[:] = 0.0
@@ -107,7 +106,7 @@ def _speed_effect(i: int, scene: Scene) -> float:
 
 @lean_kernel
 def _inputs_of(count: int, scene: Scene) -> None:
-    """Scaled inputs of the candidate (``scene.z_now``) and the nominal commands (``scene.z0``), and the movers' gains.
+    """Find the scaled inputs of candidate (``scene.z_now``) and nominal commands (``scene.z0``), and the movers' gains.
 
     ``scene.gain[i]`` holds d(psi)/d(z_t) in rad, d(v)/d(z_s) in m/s, and the full turn, deg.
     """
@@ -131,7 +130,7 @@ def _add_effect(r: int, i: int, m: int, sign: float, scene: Scene) -> None:
     k = min(int(at), path.shape[0] - 2)
     part = min(1.0, at - k)
     x, y = path[k, 0], path[k, 1]
-    if part > 0.0:  # at the end of a path nothing of it lies beyond
+    if part > 0.0:  # the path ends at its last sample
         x += part * (path[k + 1, 0] - x)
         y += part * (path[k + 1, 1] - y)
     rx, ry = x - scene.next_state[i, L.X], y - scene.next_state[i, L.Y]
@@ -144,7 +143,7 @@ def _add_effect(r: int, i: int, m: int, sign: float, scene: Scene) -> None:
 def _close_row(r: int, i: int, about_what: int, lack: float, count: int, scene: Scene) -> int:
     """Set the right-hand side so that the row reads h + C (z - z_now) >= target; scale to unit length, and label it.
 
-    Returns the number of the next row: the same when no inputs can violate it, or none have any effect on it.
+    Returns the number of the next row: the same if no inputs can violate the row, or none affects it.
     """
     row, root, most = scene.C[r, : 2 * count], math.sqrt(scene.tuning.speed_weight), 0.0
     for c in range(0, 2 * count, 2):
@@ -164,9 +163,10 @@ def _close_row(r: int, i: int, about_what: int, lack: float, count: int, scene: 
 
 @lean_kernel
 def _rows_of_boats(r: int, m: int, count: int, scene: Scene) -> int:
-    """Rows of mover m about other boats; returns the row after the last, or -1 when there are too many.
+    """Write rows of mover m about other boats; return the next row, or -1 if there are too many.
 
-    A boat's target is what it, and boat j if that keeps everything and is ours, keeps from all boats on their backups.
+    The target is the largest of the required margin, boat i's own margin on the backups, and that of teammate j if j
+    satisfies everything there.
     """
     i = scene.movers[m]
     for j in range(scene.ours.shape[0]):
@@ -189,7 +189,7 @@ def _rows_of_boats(r: int, m: int, count: int, scene: Scene) -> int:
 
 @lean_kernel
 def _row_of_static(r: int, m: int, about_what: int, count: int, scene: Scene) -> int:
-    """Row of mover m about obstacles near in time, or all static constraints; returns the number of the next."""
+    """Write mover m's row about obstacles near in time, or all static constraints; return the next row."""
     i, target_m = scene.movers[m], 0.0
     if about_what == NEAR_OBSTACLES:
         nearest = clear_of_near_obstacles(i, i, scene, FAR, scene.out)
@@ -206,7 +206,7 @@ def _row_of_static(r: int, m: int, about_what: int, count: int, scene: Scene) ->
 
 @lean_kernel
 def _rows_of_limits(r: int, m: int, scene: Scene) -> int:
-    """Actuator limits of mover m: -1 <= z_t <= 1, 0 <= z_s <= sqrt(speed_weight); returns the number of the next."""
+    """Write actuator limits of mover m: -1 <= z_t <= 1, 0 <= z_s <= sqrt(speed_weight); return the next row."""
     lowest = (-1.0, -1.0, 0.0, -math.sqrt(scene.tuning.speed_weight))
     for side in range(4):
         scene.C[r, :] = 0.0
@@ -219,11 +219,11 @@ def _rows_of_limits(r: int, m: int, scene: Scene) -> int:
 
 @lean_kernel
 def linearise(count: int, scene: Scene) -> int:
-    """Rows about the candidate; how many, or -1 when there are too many or the decision has cost its limit.
+    """Write the rows about the candidate; return how many, or -1: too many, or the work budget is used up.
 
     ``scene.label[r]`` says whose row it is, and about which other boat, or about what else, see `LIMITS`.
     """
-    if all_spent(scene) or 6 * count > scene.C.shape[0]:  # two rows of static constraints and four of limits for each
+    if all_spent(scene) or 6 * count > scene.C.shape[0]:  # two static rows and four of limits each
         return -1
     for m in range(count):
         scene.spent[0] += scene.cost[scene.movers[m]]
@@ -280,7 +280,7 @@ def begin_program(scene: Scene) -> int:
 
 @lean_kernel
 def _take_answer(z: Array, count: int, scene: Scene) -> bool:
-    """Turn scaled inputs, but unchanged ones, into commands that yield them; False when any of them is not finite."""
+    """Turn scaled inputs (except unchanged ones) into commands that produce them; return False if any is not finite."""
     root, dt_s = math.sqrt(scene.tuning.speed_weight), scene.tuning.dt_s
     for m in range(2 * count):
         if not math.isfinite(z[m]):

@@ -22,27 +22,27 @@ from ..platforms.usv import wrap_degrees
 from ..workspace import Scene, unchanged
 
 NEAR_M = 2.0
-"""Distance beyond what is to be kept within which a boat is alongside, m."""
+"""Distance beyond the required one within which a boat is alongside, m."""
 ALIKE_DEG = 45.0
-"""Courses that differ by no more are all but the same."""
+"""Courses that differ by no more count as nearly the same."""
 PRESSING_DEG = 15.0
-"""A smaller turn wanted is steady steering."""
+"""A smaller nominal turn is steady steering."""
 TURNED_DEG = 20.0
-"""A boat that has turned so far to the side it wants is not kept from turning."""
+"""A boat that has turned this far to its nominal side is not kept from turning."""
 FREED_S = 1.0
 """A boat whose nominal command has passed for longer is not kept from turning, s."""
 AWAY_DEG = 120.0
 """Turn commanded to the boat that gives way."""
 ABREAST_M = 1.0
-"""Who is behind by no more is abreast, m."""
+"""A boat behind by no more is abreast, m."""
 CLEAR_M = 3.0
-"""Distance beyond what is to be kept from which who gave way is clear of the other, m."""
+"""Distance beyond the required one at which the boat that gave way is clear of the other, m."""
 LONGEST_S = 20.0
 """Longest time a boat gives way, s."""
 STILL_MPS = 0.2
-"""A boat that wants no more than this does not want to go anywhere."""
+"""A boat with a nominal speed up to this does not want to go anywhere."""
 PATIENCE = 3.0
-"""Times as long as others a boat that has the right of way presses before it gives way nevertheless."""
+"""Factor on the waiting time of a boat with right of way before it gives way nevertheless."""
 
 
 @lean_kernel
