@@ -49,19 +49,19 @@ def extrapolate(state: Array, seconds: Array) -> None:
 
 @kernel
 def roll_out_pending(state: Array, who: BoolArray, params: Array, pending: Array, dt_s: float) -> None:
-    """Step boats of ``who`` through commands on their way, the others straight on; in place.
+    """Step boats of ``who`` through commands not yet in effect, the others straight on; in place.
 
     Args:
         state: (n, N_STATE) boats now.
         who: (n,) boats whose commands are known.
         params: (n, N_PARAM) platform rows.
         pending: (steps, n, 2) speed m/s and absolute heading deg, the next to take effect first; NaN: none was sent,
-            the boat goes straight on, as it does for values no shield sends.
+            the boat goes straight on, as it does for values that no shield sends.
         dt_s: step, s.
     """
     for k in range(pending.shape[0]):
         for i in range(state.shape[0]):
-            # what boats not ours were told may be anything
+            # commands of other boats may be anything
             if who[i] and abs(pending[k, i, 0]) <= LARGEST_COMMAND and abs(pending[k, i, 1]) <= 2.0 * LARGEST_COMMAND:
                 error = (pending[k, i, 1] - state[i, L.HEADING] + 180.0) % 360.0 - 180.0
                 step_boat(params[i], state[i], pending[k, i, 0], error, dt_s)
@@ -86,7 +86,7 @@ def queue_commands(pending: Array, state: Array, commands: Array) -> None:
 
 @kernel
 def astern_as_turned_ahead(state: Array, controlled: BoolArray) -> None:
-    """Turn other boats that go astern round, in place, so that they go ahead the same way."""
+    """Reverse other boats that go astern, in place, so that they go ahead on the same course."""
     for i in range(state.shape[0]):
         if not controlled[i] and state[i, L.SPEED] < 0.0:
             state[i, L.HEADING] = state[i, L.HEADING] % 360.0 - 180.0
@@ -115,8 +115,8 @@ def who_stayed(before: tuple[Any, ...], now: tuple[Any, ...]) -> tuple[IntArray,
 def carry_over(old: Scene, new: Scene, stayed: IntArray, then: IntArray, state: Array) -> None:
     """Copy what is remembered of boats that stayed to the scene of another fleet, in place.
 
-    Margins are those of the boats seen then. Of a boat that meets a new one none is known of them all: it is asked for
-    no more than a margin of 0, and its backup is kept.
+    Margins are those from the boats seen then. A boat that can meet a new one has no margin that covers all boats: its
+    required margin is 0, and it keeps its backup.
 
     Args:
         old: the scene until now.
@@ -135,7 +135,7 @@ def carry_over(old: Scene, new: Scene, stayed: IntArray, then: IntArray, state: 
     gap_m = np.hypot(state[:, None, L.X] - state[None, :, L.X], state[:, None, L.Y] - state[None, :, L.Y])
     meets: BoolArray = gap_m <= new.tuning.radius_m + (top[:, None] + top[None]) * horizon_s
     met = (meets & fresh[None] & ~np.eye(len(state), dtype=np.bool_)).any(axis=1)
-    new.pending[:, :, stayed] = old.pending[:1, :, then]  # all deciders know what all boats were told
+    new.pending[:, :, stayed] = old.pending[:1, :, then]  # all deciders know all boats' commands
     for_team = len(old.memories) == len(new.memories) == 1
     for i, k in [(0, 0)] if for_team else zip(stayed, then, strict=True):
         kept, was = new.memories[i], old.memories[k]

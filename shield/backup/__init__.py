@@ -1,1 +1,1 @@
-"""Backup manoeuvres: which there are, where they lead, what each is worth, and which one every boat holds."""
+"""Backup manoeuvres: the families, their rollouts, their scores, and which one every boat holds."""

@@ -12,17 +12,17 @@ from ..jit import lean_kernel
 from ..workspace import Scene
 
 NOTHING, BOATS, OBSTACLES, OPPONENTS, ALL = range(5)
-"""What is kept, each with all before it: clear of teammates and of opponents that hold their course; of obstacles near
-in time; what must be kept from all boats, whatever they are granted; what must be kept from static constraints."""
+"""Levels of a score, each with all before it: clear of teammates and of opponents that hold their course; clear of
+obstacles near in time; the required margins from all boats, pursuers included; those from static constraints."""
 
 SPARE_SCORE = 1e-3
-"""Worth of a metre to spare from boats beside one that static constraints are short of."""
+"""Weight of a metre to spare from boats, relative to a metre by which static constraints are violated."""
 
 LATER_SCORE_M = 1e-3
-"""Worth, m, of a sample more before a path is deepest in an obstacle, or where a barrier gives no margin at all."""
+"""Score, m, of one more sample before a path is deepest in an obstacle, or where a barrier gives no margin."""
 
 SAME_M = 1e-6
-"""Worths that differ by no more, m, are alike: rounding, which differs from place to place, decides between none."""
+"""Scores that differ by no more, m, are equal, so that rounding, which varies with the place, decides nothing."""
 
 
 class Rank(NamedTuple):
@@ -40,7 +40,7 @@ class Rank(NamedTuple):
 
 
 WORST = Rank(NOTHING, -1e9)
-"""No more than any manoeuvre is worth."""
+"""A score that every manoeuvre reaches."""
 
 
 @lean_kernel
@@ -73,7 +73,7 @@ def least_to_beat(best: Rank) -> float:
 
 @lean_kernel
 def is_no_better(i: int, slot: int, best: Rank, scene: Scene) -> bool:
-    """Whether a manoeuvre of boat i in ``slot`` is no better than the best, whatever its path, by what tables tell."""
+    """Return whether any path of a manoeuvre in ``slot`` scores no better than the best, by value tables alone."""
     least_m = least_to_beat(best)
     return scene.tuning.margin_cap_m < least_m or falls_short_at_once(i, slot, level_to_beat(best), least_m, scene)
 
@@ -88,7 +88,7 @@ def _skip_pursuers(slot: int, scene: Scene) -> None:
 
 @lean_kernel
 def _rank_if_clear(i: int, slot: int, scene: Scene) -> Rank:
-    """Rank of a path that keeps what must be kept from all boats, by static constraints and the margin in ``slot``."""
+    """Return the score of a path that satisfies all margins from boats, by static and boats' margins in ``slot``."""
     if not scene.static_known[slot]:
         scene.static_known[slot], scene.static_by[slot] = (
             True,

@@ -11,8 +11,8 @@ from ..workspace import Scene
 from .paths import Manoeuvre, Span, trace_path
 
 NO_PURSUERS, PURSUERS_TILL_READY, PURSUERS = range(3)
-"""How far pursuers are run through: not at all, until tables answer (thrust is back, and of several for a while), or to
-the end of the pursuit."""
+"""How far pursuers are rolled out: not at all; until tables answer (thrust is back; for a while if several); or to the
+end of the pursuit."""
 
 
 @lean_kernel

@@ -2,7 +2,7 @@
 
 For boat i with backup manoeuvre m (turn to one side, then straight, at a set speed),
 
-h_i(x) = max over m of min over neighbours j, over what j may do, over t of |p_i(t; m) - p_j(t)| - R_ij,
+    h_i(x) = max over m of min over neighbours j, over what j may do, over t of |p_i(t; m) - p_j(t)| - R_ij,
 
 with the boat's own motion from its full model (thrust lag, speed lost in the turn, turn rate bound by thrust). One
 manoeuvre serves all neighbours of a boat, so rows of different neighbours never contradict each other: the manoeuvre
@@ -21,7 +21,7 @@ from .clearance import FAR, MARGIN, clear_of_course
 from .pursuit import closing
 
 ROUNDING_M = 1e-6
-"""Margins are looked at so far beyond what must be kept: one that is said to be above must not round to below."""
+"""Margins are computed this far beyond the required one: a margin reported above it must not round to below."""
 
 
 @lean_kernel
@@ -39,9 +39,9 @@ def reported_margin(i: int, scene: Scene) -> float:
 
 @lean_kernel
 def clear_of_boat(i: int, j: int, path: Array, scene: Scene, floor_m: float, cap_m: float) -> None:
-    """Clearance row of boat i on ``path`` from boat j, into ``scene.out``.
+    """Find the clearance row of boat i on ``path`` from boat j, in ``scene.out``.
 
-    One that is not ours to steer, and whose way is not foreseen, holds course and speed.
+    A boat that is not own, and whose way is not predicted, holds course and speed.
     """
     state, ours, boats, tuning = scene.state, scene.ours, scene.boats, scene.tuning
     search = closing(i, j, scene), scene.radius[i, j], floor_m, cap_m

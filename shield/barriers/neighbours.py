@@ -102,8 +102,8 @@ def _reach_samples(i: int, scene: Scene) -> int:
 
 
 DRIVEN_MPS, DRIVEN_X, DRIVEN_Y, DRIVEN_S = range(4)
-"""What drives a boat: speed m/s (NaN: not driven), place it is steered at, m (NaN: none, the heading error is 0), and
-the time, s, for which that is sure to last."""
+"""Columns of `Fleet.driven`: speed m/s (NaN: not driven), place that the boat is steered at, m (NaN: none, the heading
+error is 0), and the time, s, for which that is sure to last."""
 
 
 @lean_kernel

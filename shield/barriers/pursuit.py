@@ -16,23 +16,23 @@ from .neighbours import may_pursue
 from .value_function import adversarial_for, beyond_table, margin_when_ready, table_answers, tabled, worst_at_once
 
 RUDDERS = (1.0, 0.6, 0.3, 0.0)
-"""Hardest turns pursuers are followed with, shares of the granted one.
+"""Rudders of the pursuers that are rolled out: shares of the hardest turn that they are assumed to make.
 
-A hard turn costs speed, a gentle one time. Each of these turns as hard as its own entry and loses the speed of the next
-gentler one, and so does better than any that turn steadily in between; the last entry is only that, none is followed.
+A hard turn costs speed, a gentle one time. Each pursuer turns as hard as its own entry, but loses only the speed of the
+next gentler one. So it does better than any that turns steadily in between. The last entry serves only as that.
 """
 FORGOTTEN_LOSS = 0.1
-"""Pursuers that lose less of their speed for good in their hardest turn are followed with that turn only."""
+"""Pursuers that lose less of their speed for good in their hardest turn are rolled out with that turn only."""
 LEAD_SHARE = 0.15
-"""Share of the time that the pursuit lasts by which a pursuer leads the boat at most."""
+"""Largest lead of a pursuer on the boat, as a share of the time that the pursuit lasts."""
 CHASE_LEAD_SHARE = 0.3
-"""The same of one that is no faster than the boat and follows it for longer."""
+"""The same for a pursuer that is no faster than the boat and is followed for longer."""
 LONGEST_STRIDE = 6
-"""Samples a pursuer far away is moved on at once: ``scene.turns`` has a row for each number of them."""
+"""Most samples in one stride of a pursuer far away; ``scene.turns`` has a row for each number of them."""
 CHASE_STRIDE = 4
-"""Samples a pursuer that is near is moved on at once when it follows a boat that has long run straight."""
+"""Samples in one stride of a near pursuer once the boat has long run straight."""
 ROUNDING_M = 1e-6
-"""A pursuer that is past is so by more than this, m."""
+"""Tolerance with which a pursuer counts as past, m."""
 
 
 class Pursuit(NamedTuple):
@@ -43,7 +43,7 @@ class Pursuit(NamedTuple):
     closely: int  # sample from which on the boat runs straight: it is followed in longer strides
     ahead: float  # most samples by which it leads the boat
     fade: float  # factor of negative margins per sample, 0 to 1
-    to_table: bool  # follow it to the end also when it comes near no more: a table is looked up there
+    to_table: bool  # whether a table is looked up at the end: it is then followed to there in any case
     most_m: float  # most that either moves from sample to sample
 
 
@@ -58,7 +58,7 @@ def closing(i: int, j: int, scene: Scene) -> float:
 
 @lean_kernel
 def _faded(worst: float, weight: float, radius_m: float, x0: float, y0: float, x1: float, y1: float) -> float:
-    """Least margin over a leg, weighted when negative, where that is below ``worst``; else that."""
+    """Return the least margin over a leg, weighted if negative, or ``worst`` if that is less."""
     limit = radius_m + (worst if worst >= 0.0 else worst / weight)
     if limit <= 0.0:
         return worst
@@ -72,11 +72,11 @@ def _faded(worst: float, weight: float, radius_m: float, x0: float, y0: float, x
 
 @lean_kernel
 def _aim(rx: float, ry: float, vx: float, vy: float, way: float, ahead: float) -> tuple[float, float]:
-    """Where a pursuer steers: to the point where it meets the boat if that keeps its velocity.
+    """Return where a pursuer steers: to the point where it meets the boat if the boat keeps its velocity.
 
-    Where there is none, or one far off, it steers ``ahead`` samples ahead of the boat: one about as fast as the boat
-    and on its quarter comes nearest by closing in slowly on an all but parallel course.
-    (rx, ry) points from pursuer to boat; (vx, vy) is the boat's and ``way`` the pursuer's movement per sample, m.
+    If there is no such point, or only a far one, it steers ``ahead`` samples ahead of the boat. A pursuer about as
+    fast as the boat and on its quarter comes nearest by closing in slowly on a nearly parallel course. (rx, ry) points
+    from pursuer to boat; (vx, vy) is the boat's and ``way`` the pursuer's movement per sample, m.
     """
     a, b, c = vx * vx + vy * vy - way * way, rx * vx + ry * vy, rx * rx + ry * ry
     root, time = b * b - a * c, -1.0
@@ -94,7 +94,7 @@ def _aim(rx: float, ry: float, vx: float, vy: float, way: float, ahead: float) -
 
 @lean_kernel
 def _turn_towards(ux: float, uy: float, ax: float, ay: float, c: float, s: float) -> tuple[float, float, float]:
-    """Heading (ux, uy) turned towards (ax, ay) by the most there is, cosine c and sine s, and the share of it used."""
+    """Return heading (ux, uy) turned towards (ax, ay) by at most cosine c and sine s, and the share of that used."""
     along, across = ux * ax + uy * ay, ux * ay - uy * ax
     if along > 0.0 and abs(across) * c <= along * s:
         norm = math.sqrt(ax * ax + ay * ay)
@@ -108,7 +108,7 @@ def _turn_towards(ux: float, uy: float, ax: float, ay: float, c: float, s: float
 
 @lean_kernel
 def _speed_after(j: int, speed_mps: float, steady_mps: float, time_s: float, scene: Scene) -> float:
-    """Speed some time on of pursuer j whose speed in the present turn would settle at the steady one."""
+    """Return the speed of pursuer j after a time, if its speed in the present turn settles at the steady one."""
     if speed_mps > steady_mps:
         return max(steady_mps, speed_mps - scene.boats.granted_dec_mps2[j] * time_s)
     return min(steady_mps, speed_mps + scene.boats.granted_acc_mps2[j] * time_s)
@@ -116,11 +116,11 @@ def _speed_after(j: int, speed_mps: float, steady_mps: float, time_s: float, sce
 
 @lean_kernel
 def _never_near(i: int, j: int, slot: int, lasts: int, scene: Scene) -> bool:
-    """Whether no run of opponent j, however it steers, ends with less than the cap: then none needs to be made.
+    """Return whether no rollout of opponent j, however it steers, ends below the cap, so that none is needed.
 
-    The boat stays clear of all points it may have reached by then, and by so much more that the longest strides of
-    runs make no difference. A boat clear of one no slower at some sample is so at all before it; of a slower one the
-    room shrinks by no more than what it is slower by from sample to sample back. False when in doubt.
+    The boat then stays clear of all points that j may have reached, with room for the longest strides of rollouts. If
+    j is no slower than the boat, clearance at one sample implies clearance at all before it. If j is slower, the room
+    shrinks from sample to sample back by at most the difference of their ways. False when in doubt.
     """
     path, course, sample_s = scene.path[slot], scene.course[j], scene.boats.sample_s
     way_m, closing_m = _fastest_mps(j, scene) * sample_s, closing(i, j, scene)
@@ -144,9 +144,10 @@ def _fastest_mps(j: int, scene: Scene) -> float:
 
 @lean_kernel
 def _pursuit_of(i: int, j: int, slot: int, lasts: int, closely: int, to_table: bool, scene: Scene) -> Pursuit:
-    """A pursuit of boat i by opponent j that lasts so many samples, or until thrust on the path in ``slot`` is full.
+    """Return a pursuit of boat i by opponent j for ``lasts`` samples, or until thrust on the path in ``slot`` is full.
 
-    How far the pursuer leads the boat goes by how long it lasts, and negative margins fade as much by the end of any.
+    The pursuer's lead on the boat grows with the length of the pursuit. Negative margins fade equally by the end of
+    any.
     """
     boats = scene.boats
     samples = min(lasts, int(scene.ready[slot, READY_SAMPLE])) if to_table else lasts
@@ -165,7 +166,7 @@ def _pursuit_of(i: int, j: int, slot: int, lasts: int, closely: int, to_table: b
 
 @lean_kernel
 def _stride(k: int, free: int, pursuit: Pursuit) -> int:
-    """Samples a pursuer is moved on at once from sample k, before which it cannot come near for so many."""
+    """Return the samples in the next stride of a pursuer from sample k, if it cannot come near within ``free``."""
     left, stride = pursuit.samples - k, 1 if k < pursuit.closely else CHASE_STRIDE
     if free > 0:
         stride = max(stride, min(free, LONGEST_STRIDE))
@@ -174,7 +175,7 @@ def _stride(k: int, free: int, pursuit: Pursuit) -> int:
 
 @lean_kernel
 def _note_turns(j: int, rudder: int, scene: Scene) -> None:
-    """Write cosine and sine of the hardest turns of opponent j in 1, 2, ... samples, also from rest: it comes soon."""
+    """Write cosine and sine of opponent j's hardest turns in 1, 2, ... samples, also from rest: it speeds up soon."""
     turn = RUDDERS[rudder] * (math.radians(scene.boats.granted_turn_dps[j]) * scene.boats.sample_s)
     turns = scene.turns
     turns[0, 0], turns[0, 1] = math.cos(turn), math.sin(turn)
@@ -193,7 +194,7 @@ def _begin_run(j: int, run: Array, own: Array, scene: Scene) -> None:
 
 @lean_kernel
 def _is_past(k: int, x: float, y: float, worst: float, own: Array, radius_m: float, pursuit: Pursuit) -> bool:
-    """Whether a run at (x, y) cannot lower its margin any more, however it steers: what is left is too short."""
+    """Return whether a rollout at (x, y) cannot lower its margin any more, however it steers in the time left."""
     dx, dy = own[pursuit.samples, 0] - x, own[pursuit.samples, 1] - y
     reach_m = radius_m + worst + ROUNDING_M + (pursuit.samples - k) * pursuit.most_m
     return not pursuit.to_table and dx * dx + dy * dy >= reach_m * reach_m
@@ -201,7 +202,7 @@ def _is_past(k: int, x: float, y: float, worst: float, own: Array, radius_m: flo
 
 @lean_kernel
 def _move_on(k: int, lead: int, i: int, j: int, slot: int, loss: float, pursuit: Pursuit, scene: Scene) -> int:
-    """Move a run of opponent j on from sample k; returns the sample it then is at, the last where it is past."""
+    """Move a rollout of opponent j on from sample k; return the sample it then is at: the last if it is past."""
     run, own, sample_s = scene.runs[lead], scene.path[slot], scene.boats.sample_s
     x, y, ux, uy, speed_mps = run[W.RUN_X], run[W.RUN_Y], run[W.RUN_EAST], run[W.RUN_NORTH], run[W.RUN_SPEED]
     x0, y0, worst, weight = run[W.RUN_TO_X], run[W.RUN_TO_Y], run[W.RUN_WORST], run[W.RUN_WEIGHT]
@@ -235,12 +236,12 @@ def _move_on(k: int, lead: int, i: int, j: int, slot: int, loss: float, pursuit:
 
 @lean_kernel
 def _run_pursuers(i: int, j: int, slot: int, rudder: int, pursuit: Pursuit, floor_m: float, scene: Scene) -> float:
-    """Margin, m, from opponent j that turns so hard and steers for boat i, or that leads it: the worse of the two.
+    """Return the margin, m, from opponent j with this rudder: the worse of steering for the boat and leading it.
 
-    Negative margins fade with the time until they come about: a graze far off is less of an evil than a ramming soon,
-    for pursuers rarely play as well as they are granted to. The search stops once the margin is below the floor; its
-    cap is one for all, since a pursuer's strides depend on it and must not depend on who is looked at before. The two
-    are moved on in turns, since a processor does as much at once as does not hang on what comes just before.
+    Negative margins fade with the time until they occur. A graze far off matters less than a ramming soon, since
+    pursuers rarely play as well as assumed. The search stops once the margin is below the floor. The cap is common to
+    all, because a pursuer's strides depend on it, and must not depend on who is checked before. Both rollouts advance
+    in turns: a processor overlaps work that does not depend on what comes just before.
     """
     runs, last, loss = scene.runs, pursuit.samples, scene.boats.granted_loss[j] * RUDDERS[rudder + 1]
     _note_turns(j, rudder, scene)
@@ -265,12 +266,12 @@ def _run_pursuers(i: int, j: int, slot: int, rudder: int, pursuit: Pursuit, floo
 
 @lean_kernel
 def clear_of_pursuer(i: int, j: int, slot: int, floor_m: float, scene: Scene) -> float:
-    """Margin, m, of boat i on the path in ``slot`` from opponent j using the turn and thrust granted to it against it.
+    """Return the margin, m, of boat i on the path in ``slot`` from opponent j, which pursues with its assumed turn.
 
-    The worst of several pursuers: steering at the boat or for the meeting point, turning hard or gently. Those that
-    came below their floor last are looked at first. They are followed until the boat's thrust is full and as long
-    beyond as such a boat needs to get away; where a table is for the pair it tells what they can do from where thrust
-    is full, of an outnumbered boat (see `value_function.find_outnumbered`) not before ``boats.joint_samples``.
+    It is the worst of several pursuers: steering at the boat or for the meeting point, turning hard or gently. The
+    rudder that last came below its floor is checked first. Pursuers are followed until the boat's thrust is full, and
+    then for as long as such a boat needs to get away. If the pair has a table, the table covers what follows once
+    thrust is full; for an outnumbered boat (see `value_function.find_outnumbered`) not before ``boats.joint_samples``.
     """
     boats, ready = scene.boats, int(scene.ready[slot, READY_SAMPLE])
     to_table = ready >= 0 and tabled(i, j, scene)
@@ -296,7 +297,7 @@ def clear_of_pursuer(i: int, j: int, slot: int, floor_m: float, scene: Scene) ->
 
 @lean_kernel
 def _first_then_rest(first: int, number: int) -> int:
-    """Entry ``number`` of the list 0, 1, 2, ... with ``first`` moved to its front."""
+    """Return entry ``number`` of the list 0, 1, 2, ... with ``first`` moved to its front."""
     if number == 0:
         return first
     return number if number > first else number - 1
@@ -311,10 +312,10 @@ def _note(margin_m: float, j: int, slot: int, scene: Scene) -> None:
 
 @lean_kernel
 def _clear_of_threat(i: int, j: int, slot: int, level_m: float, least_m: float, scene: Scene) -> bool:
-    """Note the worst that opponent j may do; False when it is short of its target and below the level, or of the least.
+    """Note the worst that opponent j may do; return False if it is below its floor, given by target, level and least.
 
-    An outnumbered boat is also rolled out for a while, and looked up from there; on a manoeuvre on which thrust never
-    is full it is lost.
+    For an outnumbered boat, j is also rolled out for a while and looked up from there. On a manoeuvre on which thrust
+    never becomes full, such a boat counts as lost.
     """
     target_m = scene.threat_target_m[i, j]
     floor_m, by_table = max(least_m, min(target_m, level_m)), table_answers(i, j, slot, scene)
@@ -354,7 +355,7 @@ def _may_harm(i: int, j: int, scene: Scene) -> bool:
 
 @lean_kernel
 def falls_short_at_once(i: int, slot: int, level_m: float, least_m: float, scene: Scene) -> bool:
-    """Whether `worst_pursuer` would stop by what tables tell of the place in ``slot``, whatever the path there."""
+    """Return whether `worst_pursuer` would stop by what tables report of the place in ``slot``, whatever the path."""
     for j in range(scene.ours.shape[0]):
         if _may_harm(i, j, scene) and table_answers(i, j, slot, scene):
             floor_m = max(least_m, min(scene.threat_target_m[i, j], level_m))

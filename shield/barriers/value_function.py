@@ -2,7 +2,7 @@
 
 With V(x_i, x_j) the distance boat i can keep from opponent j for as long as the table looks ahead (`shield.tables`),
 
-h_ij(x) = V(x_i, x_j) - R_ij - m,
+    h_ij(x) = V(x_i, x_j) - R_ij - m,
 
 where m is the margin for the table's own error. The table covers the worst opponent from some moment on, not until
 then. So the opponent is moved on until then in each of a few ways, and the least value counts.
@@ -28,7 +28,7 @@ WAYS = 3
 """Ways an opponent may move: straight on, hard to port, hard to starboard."""
 
 ROOM_M = 0.5
-"""A table is looked into when it tells distances at least this much beyond the radius, m."""
+"""A table is used if it covers distances at least this far beyond the radius, m."""
 
 PLACE_X, PLACE_Y, PLACE_HEADING, PLACE_SPEED, PLACE_USABLE = range(5)
 """Columns of a place: position m, heading rad, speed m/s, and whether the table holds for the boat there."""
@@ -47,11 +47,9 @@ def _note_place(row: Array, ready_thrust: float, place: Array) -> None:
 
 @lean_kernel
 def run_opponents(steps: int, scene: Scene) -> None:
-    """Write where the opponents that tables are looked up for may be after some steps: ``scene.ways``.
+    """Write where opponents with tables may be after some model steps, at least one decision: ``scene.ways``.
 
-    These are steps of the boat model, and no fewer than there are in one of decisions.
-
-    What was known of margins against opponents holds no more.
+    Known margins from opponents become invalid.
     """
     state, ours, boats, tuning = scene.state, scene.ours, scene.boats, scene.tuning
     scene.pursuers_known[:] = False
@@ -100,8 +98,8 @@ def find_outnumbered(scene: Scene) -> None:
 def set_place(i: int, slot: int, side: float, togo_deg: float, speed_mps: float, done: int, scene: Scene) -> None:
     """Write where boat i is looked up for the manoeuvre in ``slot``.
 
-    That is its predicted state (done = 1), the same for every manoeuvre, or where it is ``boats.table_steps`` steps
-    into the manoeuvre (done = 0): within one step manoeuvres hardly differ.
+    For done = 1 that is its predicted state, the same for every manoeuvre. For done = 0 it is ``boats.table_steps``
+    steps into the manoeuvre, because within one step manoeuvres hardly differ.
     """
     state, boats, tuning = scene.state, scene.boats, scene.tuning
     if boats.table_steps[i] == 0:
@@ -144,7 +142,7 @@ def beyond_table(i: int, j: int, slot: int, scene: Scene) -> bool:
 
 @lean_kernel
 def margin_when_ready(i: int, j: int, slot: int, run: Array, scene: Scene) -> float:
-    """Margin, m, of boat i where a run of opponent j ends that is to be looked up."""
+    """Return the margin, m, of boat i by table at the end of a rollout of opponent j."""
     boats, path, ready = scene.boats, scene.path[slot], scene.ready[slot]
     table, k = boats.table[i, j], int(ready[READY_SAMPLE])
     horizon_s = adversarial_for(i, j, ready[READY_SPEED], scene)
@@ -156,7 +154,7 @@ def margin_when_ready(i: int, j: int, slot: int, run: Array, scene: Scene) -> fl
 
 @lean_kernel
 def _margin_of(i: int, j: int, value_m: float, scene: Scene) -> float:
-    """Margin, m, of a distance that a table tells; `FAR` where that is its cap."""
+    """Return the margin, m, for a distance from a table; `FAR` if that is the table's cap."""
     boats = scene.boats
     if value_m >= boats.tables.axes[boats.table[i, j], CAP] - 1e-9:
         return FAR
@@ -165,9 +163,9 @@ def _margin_of(i: int, j: int, value_m: float, scene: Scene) -> float:
 
 @lean_kernel
 def table_margin(i: int, j: int, own: Array, others: Array, enough_m: float, scene: Scene) -> float:
-    """Margin of boat i at a place against opponent j at the worst of several, m; `FAR` beyond the table.
+    """Return the margin, m, of boat i at a place from opponent j at the worst of several; `FAR` beyond the table.
 
-    Once it is down to ``enough_m`` no more of them are looked at.
+    Once the margin is down to ``enough_m``, the remaining places are skipped.
     """
     boats = scene.boats
     table, kept_m = boats.table[i, j], scene.radius[i, j] + boats.table_margin_m
@@ -186,16 +184,13 @@ def table_margin(i: int, j: int, own: Array, others: Array, enough_m: float, sce
 
 @lean_kernel
 def margin_at_once(i: int, j: int, slot: int, enough_m: float, scene: Scene) -> float:
-    """Margin, m, of boat i where the manoeuvre in ``slot`` is looked up first, against the worst opponent j can do.
-
-    For ``enough_m`` see `table_margin`.
-    """
+    """Return the margin, m, of boat i from opponent j at the first lookup in ``slot``, see `table_margin`."""
     return table_margin(i, j, scene.look[slot], scene.ways[j], enough_m, scene)
 
 
 @lean_kernel
 def worst_at_once(i: int, j: int, slot: int, scene: Scene) -> float:
-    """`margin_at_once`, kept: one step on it is the same for every manoeuvre."""
+    """Return `margin_at_once`, cached: one step ahead it is the same for every manoeuvre."""
     place, known = scene.look[slot], scene.lookup[i, j]
     same = place[PLACE_X] == known[PLACE_X] and place[PLACE_Y] == known[PLACE_Y]
     if same and place[PLACE_HEADING] == known[PLACE_HEADING] and place[PLACE_SPEED] == known[PLACE_SPEED]:

@@ -1,1 +1,1 @@
-"""One decision: what is screened, the program and its rows, backups, and what is sent."""
+"""Stages of one decision: nominal check, right of way, groups, backups, QP, line search, hard line."""

@@ -114,7 +114,7 @@ def _give_back(share: float, i: int, scene: Scene) -> None:
 
 @lean_kernel
 def _blend_one(i: int, scene: Scene) -> None:
-    """Move boat i's command as near to the nominal one as no own boat's score allows to notice."""
+    """Move boat i's command as near to the nominal one as possible at no cost to any own boat's score."""
     kept, too_far, at = 0.0, 2.0, 0.0
     scene.solver[i] = BY_LINE_SEARCH
     scene.moving[:] = False

@@ -62,7 +62,7 @@ def set_required_margins(scene: Scene) -> None:
     would let it shrink at once. The margin from own teammates may shrink freely until it is small: their commands are
     known.
 
-    While a boat holds its backup, its margins may not shrink at all.
+    While a boat must hold its backup, the whole cap is required from each adversarial opponent.
     """
     ours, boats, tuning, memory = scene.ours, scene.boats, scene.tuning, scene.memory
     for i in range(ours.shape[0]):
