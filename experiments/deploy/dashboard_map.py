@@ -1,4 +1,4 @@
-"""The dashboard's map: field, flags, geofence, boats with their radii and headings, in dots of text."""
+"""The dashboard's map in text dots: field, flags, geofence, and boats with radii and headings."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .referee import game_config
 _BITS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]], dtype=np.uint8)
 _BLANK = 0x2800
 COLOURS = ("bright_blue", "bright_red", "bright_white")
-"""Of blue, red and boats outside the game."""
+"""Colours of blue, red and boats outside the game."""
 SYMBOLS = (
     ("small circle and line", "a boat in its team's colour, and the way it makes in 2 s"),
     ("large circle", "around a boat of ours: its separation radius, where nobody else should be"),
@@ -28,17 +28,17 @@ SYMBOLS = (
     ("solid box, dotted box", "the field, and the geofence"),
     ("⚑", "a flag, where it is now"),
 )
-"""What is drawn, for the operator's page."""
+"""Drawn symbols, for the operator's page."""
 AHEAD_S = 2.0
-"""The line before a boat is the way it makes in this time, s."""
+"""The line ahead of a boat is its way in this time, s."""
 MARGIN_M, FAR_M = 4.0, 60.0
-"""Room around what is shown; boats further than `FAR_M` from the field are not fitted in."""
+"""Margin around the map, m; boats further than `FAR_M` from the field are not fitted in."""
 
 
 class Canvas:
-    """A window of the field, columns x rows characters, in which a box (xmin, ymin, xmax, ymax), m, fits.
+    """A window of columns x rows characters that contains a box (xmin, ymin, xmax, ymax), m.
 
-    Y is upwards, both axes are to one scale. Where things cross, the later one gives the colour.
+    Y points up and both axes have the same scale. Where things overlap, the later one sets the colour.
     """
 
     def __init__(self, columns: int, rows: int, box: Sequence[float]) -> None:
@@ -51,25 +51,25 @@ class Canvas:
         self._letters: dict[tuple[int, int], str] = {}
 
     def line(self, start: Any, end: Any, style: str, every: int = 1) -> None:
-        """A straight line between two points, m; of its dots only each ``every``-th is set."""
+        """Draw a line between two points, m, with every ``every``-th dot."""
         n = max(2, math.ceil(math.dist(start, end) * self._per_m * (2.0 if every == 1 else 1.0)))
         share = np.linspace(0.0, 1.0, n)[::every, None]
         self._set(np.add(start, share * np.subtract(end, start)), style)
 
     def box(self, box: Sequence[float], style: str, every: int = 1) -> None:
-        """The outline of (xmin, ymin, xmax, ymax), m."""
+        """Draw the outline of (xmin, ymin, xmax, ymax), m."""
         corners = [(box[0], box[1]), (box[2], box[1]), (box[2], box[3]), (box[0], box[3])]
         for k in range(4):
             self.line(corners[k - 1], corners[k], style, every)
 
     def circle(self, centre: Any, radius_m: float, style: str) -> None:
-        """The outline of a circle, m."""
+        """Draw the outline of a circle, m."""
         n = min(2000, max(8, math.ceil(2.0 * math.pi * radius_m * self._per_m)))
         angle = np.linspace(0.0, 2.0 * math.pi, n, endpoint=False)
         self._set(np.add(centre, radius_m * np.column_stack([np.sin(angle), np.cos(angle)])), style)
 
     def label(self, place: Any, text: str, style: str, above: int = 0) -> None:
-        """A text whose first letter is at a point, m, so many rows above it, or near there where it is free."""
+        """Write a text from a point, m, ``above`` rows higher, or in a free row nearby."""
         cells = self._inside(np.array([place], dtype=float))
         if len(cells) == 0:
             return
@@ -83,7 +83,7 @@ class Canvas:
         self._styles[row, column : column + len(text)] = style
 
     def lines(self) -> list[Text]:
-        """The drawing, a text per row."""
+        """Return the drawing, a text per row."""
         found = []
         for row in range(self.rows):
             text = Text(no_wrap=True, end="")
@@ -94,7 +94,7 @@ class Canvas:
         return found
 
     def _inside(self, points: Any) -> Any:
-        """Dots (k, 2), from the upper left corner, of those points (n, 2) that are in the window."""
+        """Return dots (k, 2), from the upper left corner, for the points (n, 2) in the window."""
         dots = np.rint((points - self._corner) * (self._per_m, -self._per_m))
         fits = (dots >= 0.0) & (dots < (2 * self.columns, 4 * self.rows))
         return dots[fits.all(axis=1)].astype(np.int64)
@@ -113,11 +113,11 @@ class FieldMap:
         self._field = (0.0, 0.0, *map(float, fleet.field.size_m))
         self._separation_m = fleet.shield_config.separation_m
         self._lines: FieldGeometry | None = None
-        with contextlib.suppress(ConfigError, GameError):  # boats without a game have a field without lines
+        with contextlib.suppress(ConfigError, GameError):  # without a game the field has no lines
             self._lines = field_geometry(game_config(fleet))
 
     def draw(self, tick: Tick | None, columns: int, rows: int) -> list[Text]:
-        """The map as lines of text, for a tick or for none yet."""
+        """Return the map as lines of text; ``tick`` is None before the first."""
         canvas = Canvas(columns, rows, self._window(tick))
         canvas.box(self._fleet.geofence.box, "grey50", every=3)
         canvas.box(self._field, "white")
@@ -156,7 +156,7 @@ class FieldMap:
             canvas.label((x, y), short, f"bold {COLOURS[self._fleet.team_of.get(name, 2)]}", above=1)
 
     def _window(self, tick: Tick | None) -> tuple[float, ...]:
-        """What is shown, (xmin, ymin, xmax, ymax), m: the field and all boats not far from it."""
+        """Return the shown window (xmin, ymin, xmax, ymax), m: the field and all boats not far from it."""
         low, high = np.array(self._field[:2]), np.array(self._field[2:])
         places = np.array([row[:2] for row in places_of(tick).values()] if tick else []).reshape(-1, 2)
         near = places[((places >= low - FAR_M) & (places <= high + FAR_M)).all(axis=1)]
@@ -165,8 +165,8 @@ class FieldMap:
 
 
 def places_of(tick: Tick) -> dict[str, tuple[float, float, float, float]]:
-    """Where boats are: x m, y m, heading rad, speed m/s by name; as the shield was given it, else as heard."""
-    known: list[Any] = [*reversed(tick.contacts), *tick.readings.values()]  # of several contacts the first counts
+    """Return x m, y m, heading rad and speed m/s by name: the shield's input if known, else as received."""
+    known: list[Any] = [*reversed(tick.contacts), *tick.readings.values()]  # of a boat's contacts the first counts
     places = {one.boat: (*one.position_m, one.heading_rad, one.speed_mps) for one in known}
     if tick.fleet is not None:
         rows = np.column_stack([tick.fleet.position_m, tick.fleet.heading_rad, tick.fleet.speed_mps])

@@ -1,6 +1,6 @@
-"""What the dashboard shows of one moment: banner, table of boats, what is in effect; draws nothing by itself.
+"""Content of the dashboard at one time: banner, table of boats, active responses; it draws nothing itself.
 
-Banners, columns, reasons and keys are data with their meaning, of which the operator's page is made.
+Banners, columns, reasons and keys are data with their meaning; the operator's page is made from them.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from .dashboard_map import COLOURS, SYMBOLS, FieldMap
 from .plain import LINES
 
 MOST_ACTIONS = 6
-"""Responses in effect that are told in words."""
+"""Most active responses shown as text."""
 LOOK_AHEAD_S = 60.0
-"""Approaches later than this are not looked for."""
+"""Later approaches are not shown, s."""
 SILENT_S = 1.0
-"""A loop without a tick for so long is shown as standing still."""
+"""Time without a tick after which the loop is shown as standing still, s."""
 
 COLUMNS = {
     "boat": (10, "its name in its team's colour, and its marks"),
@@ -44,11 +44,11 @@ COLUMNS = {
     "closest": (14, "whom it meets closest when all hold course, how near and when; yellow: too near"),
     "constraint": (12, "what its command had to give way to"),
 }
-"""Of the table: characters that the longest cell needs, and meaning."""
+"""Columns of the table: characters that the longest cell needs, and meaning."""
 GROWING = (("closest", 26), ("boat", 16), ("constraint", 24), ("closest", 400))
-"""Where room that is left over goes, in this order, each up to a width."""
+"""Columns that receive spare width, in this order, each up to a width."""
 DROPPED = ("constraint", "hdg", "m/s", "age", "closest", "why", "margin")
-"""What is left out of a terminal too narrow for all, in this order; nominal and filtered stand in every one, whole."""
+"""Columns left out of a narrow terminal, in this order; nominal and filtered are always shown in full."""
 WHY = {
     Reason.PASSED: ("passed", "green", "the nominal command leaves the boat a way out: sent as it is"),
     Reason.LEAST_CHANGE: ("least", "cyan", "changed as little as it takes to keep clear of everything"),
@@ -105,7 +105,7 @@ BANNERS = {
     ),
     "fine": ("All within limits", "black on green", "nothing is declared: go on"),
 }
-"""The line that says how things stand: words, style, what it means and what to do."""
+"""Banner line: words, style, what it means and what to do."""
 KEYS = (
     ("SPACE or s", "STOP ALL", "all boats stop behind the shield; again, then `y`: by their links, past it"),
     ("r", "resume", "take STOP ALL back, after a question"),
@@ -123,7 +123,7 @@ HEAD = (
 
 
 def dashboard_page() -> str:
-    """What every line of the dashboard and of ``--plain`` means, for the operator's page, in Markdown."""
+    """Return the meaning of every line of the dashboard and of ``--plain``, for the operator's page, in Markdown."""
     parts = {
         "first line": HEAD,
         "banner": [
@@ -145,7 +145,7 @@ def dashboard_page() -> str:
 
 
 class Approach(NamedTuple):
-    """The closest approach of a boat to another within `LOOK_AHEAD_S`: m now, m then, s until then (0: they part)."""
+    """Closest approach of a boat to another within `LOOK_AHEAD_S`: m now, m then, s until then (0: they part)."""
 
     boat: str
     other: str
@@ -155,7 +155,7 @@ class Approach(NamedTuple):
 
 
 def approaches(fleet: Fleet) -> dict[str, Approach]:
-    """The closest approach of each controlled boat to any other, by its name; none without another boat."""
+    """Return each controlled boat's closest approach to any other, by name; empty without another boat."""
     velocity = fleet.speed_mps[:, None] * np.column_stack([np.sin(fleet.heading_rad), np.cos(fleet.heading_rad)])
     found = {}
     for i in np.flatnonzero(fleet.controlled) if len(fleet) > 1 else ():
@@ -174,9 +174,9 @@ def approaches(fleet: Fleet) -> dict[str, Approach]:
 
 @dataclass(frozen=True)
 class Moment:
-    """What is to be shown: the latest tick, if any, at a time of the loop's clock, s, with delays of late ticks, s.
+    """State to show: the latest tick, if any, the time on the loop's clock, s, and mean and largest delay of ticks, s.
 
-    ``stopped`` and ``ended`` say why boats are told to stop and why the run ends; empty: they are not, and it goes on.
+    ``stopped`` and ``ended`` say why boats must stop and why the run ends; empty: they need not, and it continues.
     """
 
     tick: Tick | None
@@ -189,7 +189,7 @@ class Moment:
     log: Sequence[str] = ()
 
     def banner(self) -> tuple[str, tuple[Any, ...]]:
-        """Which of `BANNERS` stands there, and what is filled in: the worst that is so."""
+        """Return the name of the most severe banner that applies, and its values."""
         if self.stopped:
             return "hard" if self.hard else "soft", (self.stopped,)
         if self.ended:
@@ -205,14 +205,14 @@ class Moment:
 
 
 class View:
-    """Shows moments of one run."""
+    """Shows the states of one run."""
 
     def __init__(self, fleet: FleetFile) -> None:
         self._fleet = fleet
         self._map = FieldMap(fleet)
 
     def of(self, moment: Moment, columns: int, rows: int) -> RenderableType:
-        """The whole screen, so many characters large."""
+        """Return the whole screen, of that size in characters."""
         lower, screen = _lower(moment, columns), Layout()
         screen.split_column(
             Layout(self._head(moment), size=2),
@@ -238,7 +238,9 @@ class View:
         tick = moment.tick
         if tick is None:
             return boats_table(width, [])
-        contacts = {contact.boat: contact for contact in reversed(tick.contacts)}  # of several the first counts
+        contacts = {
+            contact.boat: contact for contact in reversed(tick.contacts)
+        }  # of a boat's contacts the first counts
         decisions = {} if tick.decisions is None else {decision.boat: decision for decision in tick.decisions}
         near = {} if tick.fleet is None else approaches(tick.fleet)
         rows = []
@@ -267,7 +269,7 @@ class View:
 
 
 class _Drawing:
-    """A map as large as the place it is put in."""
+    """A map that fills its space."""
 
     def __init__(self, field_map: FieldMap, tick: Tick | None) -> None:
         self._map, self._tick = field_map, tick
@@ -277,7 +279,7 @@ class _Drawing:
 
 
 def boats_table(width: int, rows: Sequence[Mapping[str, Any]]) -> Table:
-    """The table of boats, so many characters wide; ``rows``: cells by title, those left out are empty."""
+    """Return the table of boats, ``width`` characters wide; ``rows``: cells by title, missing ones are empty."""
     table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, width=max(1, width), header_style="bold")
     widths = {title: needs for title, (needs, _) in COLUMNS.items()}
     for title in DROPPED:
@@ -288,7 +290,7 @@ def boats_table(width: int, rows: Sequence[Mapping[str, Any]]) -> Table:
         more = max(0, min(left, most - widths.get(title, most)))
         widths |= {title: widths[title] + more} if more else {}
         left -= more
-    widths["boat"] = max(1, widths["boat"] + min(left, 0))  # a terminal too narrow for the least: names go first
+    widths["boat"] = max(1, widths["boat"] + min(left, 0))  # if the terminal is still too narrow, names shrink first
     for title, wide in widths.items():
         table.add_column(
             title,
@@ -303,7 +305,7 @@ def boats_table(width: int, rows: Sequence[Mapping[str, Any]]) -> Table:
 
 
 def _lower(moment: Moment, columns: int) -> list[Text]:
-    """The open menu, or what is in effect and the end of the log; long lines are broken."""
+    """Return the open menu, or the active responses and the latest log lines; long lines are wrapped."""
     actions = () if moment.tick is None else moment.tick.actions
     texts = moment.menu or [f"{action.subject}: {action.text}" for action in actions[:MOST_ACTIONS]]
     style = "bold" if moment.menu else "yellow"
@@ -317,7 +319,7 @@ def _lower(moment: Moment, columns: int) -> list[Text]:
 
 
 def _own(reading: BoatReading, decision: Decision | None, tick: Tick, near: Text) -> dict[str, Any]:
-    """Cells of a boat of ours, by the column's title."""
+    """Return the cells of an own boat by column title."""
     sent = tick.sent.get(reading.boat)
     sent_text = Text("-") if sent is None else Text(_command(sent.speed_mps, sent.heading_rad))
     if sent is not None and not sent.delivered:
@@ -341,7 +343,7 @@ def _own(reading: BoatReading, decision: Decision | None, tick: Tick, near: Text
 
 
 def _other(contact: Contact | None, now_s: float, limit_s: float) -> dict[str, Any]:
-    """Cells of another boat, by the column's title."""
+    """Return the cells of another boat by column title."""
     if contact is None:
         return {"hdg": "-", "m/s": "-", "age": Text("never", "red"), "why": Text("not heard", "red")}
     age_s = now_s - contact.fixed_s

@@ -15,9 +15,9 @@ class Figure(NamedTuple):
 
     Attributes:
         key: in results.
-        meaning: what it is, with its unit, in a sentence without a full stop.
-        label: words of the terminal's table; empty: it is not shown there.
-        factor, unit, digits: from its unit to the one that is shown, that one, and its digits.
+        meaning: with its unit, without a full stop.
+        label: text in the terminal's table; empty: not shown there.
+        factor, unit, digits: factor to the shown unit, that unit, and digits shown.
     """
 
     key: str

@@ -31,7 +31,7 @@ from .orders import boats_of
 LOOP_FIRST, OTHERS_FIRST = 2, 1
 """Real-time priorities of the loop's thread and of the runner's others, above all other programs, where allowed.
 
-Nice values are not enough: under a load where this delays the loop by 0.2 ms, they delay it by 18 ms."""
+Nice values are not enough: at a load where the loop waits 0.2 ms with these priorities, it waits 18 ms with those."""
 SWITCH_S = 0.0001
 """How long another thread may hold the interpreter, s."""
 ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))

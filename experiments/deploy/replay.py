@@ -55,7 +55,7 @@ class Replay:
 
     @property
     def proved(self) -> bool:
-        """Whether every decision is proved and the log is unaltered; a log without a proper end can be proved."""
+        """Whether every decision is proved and the log is intact; a log without a proper end can be proved."""
         return self.proof.proved and self.chain.broken == 0 and not self.damage
 
     @property

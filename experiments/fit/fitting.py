@@ -93,10 +93,10 @@ class Judged:
 
     Attributes:
         fit: to all runs.
-        seen: what the boat did at its hardest.
+        seen: extremes that the boat reached.
         runs: all of them.
-        errors_m: of each run (windows, 3) distances at `AHEAD_S` between places predicted and seen, NaN: past its end.
-        held_out: of each run whether it was predicted by a fit that did not know it.
+        errors_m: per run (windows, 3) distances at `AHEAD_S` between predicted and seen position; NaN past its end.
+        held_out: per run whether it was predicted by a fit without it.
     """
 
     fit: Fit

@@ -104,10 +104,10 @@ def _slope(values: Array, over_s: float) -> Array:
 
 @dataclass(frozen=True)
 class Model:
-    """A kind of boat to be fitted: numbers with their name, first guess, lowest and highest value.
+    """A kind of boat to fit; ``bounds`` give each parameter's name, first guess, lowest and highest value.
 
-    ``guesses`` are other first guesses, each some of the numbers; ``build`` makes the platform of named values, its
-    name and its top speed.
+    ``guesses`` are further first guesses for some parameters. ``build`` makes the platform from named values, its name
+    and its top speed.
     """
 
     kind: str
@@ -127,7 +127,7 @@ class Model:
 
     def around(self, seen: Seen) -> Model:
         """Return the model with first guesses and bounds from what was seen of the boat."""
-        twice = 2.0 if self.kind == "usv" else 1.0  # a usv stores the mean of old and new speed: it accelerates half
+        twice = 2.0 if self.kind == "usv" else 1.0  # a usv averages old and new speed: half as quick
         told = {
             "max_acc": (twice * seen.acc_mps2, 0.5, 4.0),
             "max_dec": (twice * seen.dec_mps2, 0.5, 4.0),

@@ -1,4 +1,4 @@
-"""Figures of a run of simulated boats, and how the terminal shows them."""
+"""Figures of a run of simulated boats, and their display in the terminal."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _SHOWN = 10
 
 
 def boats_table(fleet: SimFleet) -> Group:
-    """Who is where and who drives whom."""
+    """Return the table of boats: team, link, id and what steers each."""
     addresses = fleet.addresses
     rows = [
         [
@@ -31,7 +31,7 @@ def boats_table(fleet: SimFleet) -> Group:
 
 
 def state_line(fleet: SimFleet) -> str:
-    """One line on how things stand."""
+    """Return a status line."""
     commanded = sum(boat.is_commanded for boat in fleet.boats.values())
     linked = len(fleet.addresses)
     nearest = next(iter(fleet.closest_approaches()), None)
@@ -41,7 +41,7 @@ def state_line(fleet: SimFleet) -> str:
 
 
 def content_of(fleet: SimFleet, team: int) -> dict[str, Any]:
-    """What `docs.KEYS` describes, and the breaches of a team's boats where the game was recorded."""
+    """Return the figures described in `docs.KEYS`, with a team's separation violations if the game was recorded."""
     recorded = fleet.truth is not None
     breaches = fleet.judge(team) if recorded else None
     return {
@@ -61,7 +61,7 @@ def content_of(fleet: SimFleet, team: int) -> dict[str, Any]:
 
 
 def approaches_table(content: dict[str, Any]) -> Group:
-    """The closest approaches."""
+    """Return the table of closest approaches."""
     rows = [
         [f"{entry['first']} - {entry['second']}", f"{entry['distance_m']:.2f}", f"{entry['time_s']:.1f}"]
         for entry in content["closest"][:_SHOWN]
@@ -71,7 +71,7 @@ def approaches_table(content: dict[str, Any]) -> Group:
 
 
 def verdicts_table(content: dict[str, Any]) -> Group:
-    """Breaches of the own team by kind and verdict."""
+    """Return the own team's separation violations by kind and verdict."""
     when = {False: "during the run", True: "after it"}
     counted = Counter((when[breach["after_run"]], breach["kind"], breach["verdict"]) for breach in content["breaches"])
     rows = [[*what, str(number)] for what, number in sorted(counted.items())]

@@ -23,17 +23,17 @@ _TURN_RATE_RADS = 0.003
 
 @dataclass(frozen=True)
 class Snapshot:
-    """One boat as its sensors see it at one moment, in the field's frame and on earth.
+    """Sensor readings of one boat at one time, in the field's frame and in geodetic coordinates.
 
     Attributes:
-        time_s: when it was so, simulated s.
+        time_s: simulated time of measurement, s.
         x_m, y_m: m.
         latitude_deg, longitude_deg: deg.
         velocity_mps: over ground along the field's axes, m/s.
         heading_rad: of the bow, clockwise from the field's y axis.
         speed_mps: along the bow over ground, negative astern, m/s.
         turn_rate_rads: clockwise.
-        has_fix: whether the place is GPS's; else it is dead reckoning.
+        has_fix: whether the position is from GPS; else it is dead reckoning.
     """
 
     time_s: float

@@ -1,6 +1,6 @@
 """`train-study`: {no shield, deployment, training, training + intervention} x {collision term or not} x seeds.
 
-Trainings with the same games are made once: without a shield and with one at deployment only, the network is the same.
+Each distinct training is run once: "no shield" and "deployment" share a network.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ if TYPE_CHECKING:
 
 COMMAND = "train-study"
 COLLISION = {"off": 0.0, "on": 0.25}
-"""Weights of the collision term; that of the paper's Table 3."""
+"""Weights of the collision term; 0.25 is from the paper's Table 3."""
 PLAYED_WITH = {
     "none": ("none", "deployment"),
     "training": ("training",),
     "training+intervention": ("training+intervention",),
 }
-"""By the shield in training, the cells of the study that its network plays."""
+"""By the shield in training, the study's cells that its network plays."""
 
 NET = Metric("nets", "mean", "net captures", "", "captures for less against")
 HITS = Metric("hit_counts", "count", "hits", "", "new collisions of the team's boats")
@@ -46,12 +46,12 @@ CHANGES = {
     **{f"nothing to shield, {shield}": (("none", "off"), (shield, "off")) for shield in SHIELDS[1:]},
     **{f"shield, deployment to shield, {one}": (("deployment", "off"), (one, "off")) for one in SHIELDS[2:]},
 }
-"""What is compared, by trainings of the same seed: shield and collision term before and after."""
+"""Comparisons between trainings of the same seed: shield and collision term before and after."""
 Cells: TypeAlias = "Mapping[tuple[str, str], pd.DataFrame]"
 
 
 def trainings_of(base: Config, folder: Path, seeds: int, games: int) -> list[Job]:
-    """A job per training: its folder, its whole config, and what its network is played with."""
+    """Return a job per training: its folder, full config, and the cells that its network plays."""
     if base.algorithm != "ppo":
         raise ConfigError(f"a study is of algorithm: ppo; the config has {base.algorithm}")
     return [
@@ -68,18 +68,18 @@ def trainings_of(base: Config, folder: Path, seeds: int, games: int) -> list[Job
 
 
 def config_of_training(base: Config, shield: str, collision: float, seed: int) -> Config:
-    """The base's settings with a shield mode, a weight of the collision term and a seed of its own."""
+    """Return the base's settings with the given shield mode, collision weight and seed offset."""
     rewards = {name: weight for name, weight in base.rewards.items() if name not in ("collision", "intervention")}
     rewards |= {"collision": collision} if collision else {}
     return base.model_copy(update={"shield": shield, "rewards": rewards, "seed": base.seed + seed})
 
 
 def train_and_play(job: Job) -> list[Row]:
-    """Train, or go on with what is there, and play the network in each of its cells; a row per cell and opponent."""
+    """Train or resume, then play the network in each of its cells; return a row per cell and opponent."""
     config, folder = config_of(job["config"]), Path(job["folder"])
     folder.mkdir(parents=True, exist_ok=True)
-    lock = lock_folder(folder)  # a worker of a study that was killed may still be at it
-    training_of(config, folder, resume=True).run()  # of one that is finished nothing is left to do
+    lock = lock_folder(folder)  # a worker of a killed study may still be running
+    training_of(config, folder, resume=True).run()  # returns at once if finished
     del lock
     network = read_weights(folder / FINAL)
     learning = learning_of(read_json(folder / CURVE, "the curve of a training", "delete its folder")["rows"])
@@ -94,7 +94,7 @@ def train_and_play(job: Job) -> list[Row]:
 
 
 def learning_of(curve: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """How fast a training learned, and what it cost: means per game that ended in it."""
+    """Return net captures per game in each quarter of a training, and hits per game over all of it."""
     ended, end = [row for row in curve if row["games"]], curve[-1]["decisions"]
     quarters: list[list[Mapping[str, Any]]] = [[] for _ in range(4)]
     for row in ended:
@@ -104,22 +104,22 @@ def learning_of(curve: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def _mean(rows: Sequence[Mapping[str, Any]], name: str) -> float:
-    """Mean per game."""
+    """Return the mean per game."""
     return float(np.average([row[name] for row in rows], weights=[row["games"] for row in rows]))
 
 
 def run_study(
     base: Config, folder: Path, seeds: int, games: int, notice: Callable[[int, int], None], jobs: int = 1
 ) -> dict[str, Any]:
-    """Train and play every cell, write the results; what a folder holds already is taken from there.
+    """Train and play every cell and write the results; cells already in the folder are reused.
 
     Args:
         base: settings that all trainings share.
-        folder: where trainings and results go.
+        folder: for trainings and results.
         seeds: per cell.
-        games: played per cell and held-out opponent, not seen in training.
-        notice: told how many trainings are done and how many there are.
-        jobs: trainings at once, a process each.
+        games: per cell and held-out opponent, which training did not use.
+        notice: called with the numbers of finished and of all trainings.
+        jobs: simultaneous trainings, one process each.
     """
     trainings = trainings_of(base, folder, seeds, games)
     settings = {"seeds": seeds, "games": games, "training": base.told()}
@@ -139,7 +139,7 @@ def run_study(
 
 
 def _check_same(training: Mapping[str, Any], folder: Path) -> None:
-    """Refuse a folder whose trainings are of other settings: its networks would count as those of this config."""
+    """Raise if the folder has a study with other settings, whose networks would count as this config's."""
     for name in (EXPERIMENT_FILE, RESULTS_FILE):
         if not (folder / name).exists():
             continue
@@ -155,7 +155,7 @@ def _check_same(training: Mapping[str, Any], folder: Path) -> None:
 
 
 def learning_page(found: Sequence[Mapping[str, Any]], folder: Path) -> tuple[str, str, list[Path]]:
-    """File name, text and pictures of the page."""
+    """Return file name, text and pictures of the page."""
     import pandas as pd
 
     lines = ["# Learning with a shield beside the reward", "", MADE, ""]
@@ -189,13 +189,13 @@ def _what_was_done(settings: Mapping[str, Any], rows: pd.DataFrame) -> str:
 
 
 def _cells(rows: pd.DataFrame) -> Cells:
-    """Trainings by shield and collision term, in the order of the tables."""
+    """Return the trainings by shield and collision term, in the order of the tables."""
     found = dict(iter(rows.groupby(["shield", "collision"])))
     return {key: found[key] for shield in SHIELDS for key in ((shield, "off"), (shield, "on")) if key in found}
 
 
 def _games(cell: pd.DataFrame) -> pd.DataFrame:
-    """One line per game of some trainings."""
+    """Return one line per game of some trainings."""
     return cell[["nets", "hit_counts"]].explode(["nets", "hit_counts"], ignore_index=True).astype(float)
 
 
@@ -205,7 +205,7 @@ def _text(one: Interval, sign: str = "") -> str:
 
 
 def _against(cells: Cells) -> list[str]:
-    """Every cell; the same networks without a shield and with one at deployment; what changes bring."""
+    """Report every cell, the effect of a shield at deployment on the same networks, and the changes."""
     rows = []
     for (shield, collision), cell in cells.items():
         net, hits = (figure(_games(cell), metric)[0] for metric in (NET, HITS))
@@ -233,7 +233,7 @@ def _against(cells: Cells) -> list[str]:
 
 
 def _while_learning(cells: Cells) -> list[str]:
-    """How fast teams learned: the games of the trainings themselves."""
+    """Report results of the training games, by quarter."""
     import pandas as pd
 
     rows = []
