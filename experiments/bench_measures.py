@@ -1,4 +1,4 @@
-"""What a decision, a solver, a look-up, a batch of games and their memory cost: each measured in one run."""
+"""Measurements of the cost of decisions, solvers, table look-ups, and batches of games with their memory."""
 
 from __future__ import annotations
 
@@ -30,26 +30,25 @@ from .play.spec import MatchSpec
 
 QUANTILES = {"p50_us": 0.5, "p99_us": 0.99, "p99_9_us": 0.999}
 REFERENCE = "daqp"
-"""The solver that programs are collected with and others are compared with."""
+"""The solver that programs are collected with and that others are compared with."""
 COMPILED = "active set (baselines)"
-"""The compiled solver of the filters that the shield is compared with; the shield itself solves by another."""
+"""The compiled solver of the baseline filters; the shield itself uses another."""
 OPPONENTS = ("easy", "medium", "hidden", "rammer")
 PAIR = ("surveyor", "heron")
-"""Own boat and opponent of the value table that is looked up in."""
+"""Own boat and opponent of the value table used for look-ups."""
 SPREAD_STEPS, LEAST_STEPS = 100, 5
-"""Steps before timing, in which boats leave their start places and get in each other's way; steps timed at least."""
+"""Steps before timing, in which boats leave their starts and meet each other; least number of timed steps."""
 STAGES = {"passes": "pass, backups held", "searches": "pass after a search", "changes": "do not pass"}
-"""Kinds of decisions, in words: those whose nominal commands pass on the backups that are held; those that pass after a
-search for others; and those in which some command is short of something, so that backups, program and exact checks
-follow."""
+"""Kinds of decisions: all nominal commands pass with the stored backups; they pass after a search for other backups; or
+some command fails the nominal check, so that backups, QP and exact checks follow."""
 PARTS = ("all_us", "check_us", "rest_us", "python_us")
-"""Times of a decision: all, the nominal check, what follows it, and what stands round compiled code."""
+"""Times of a decision: total, nominal check, remaining compiled code, and Python around it."""
 Times = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class BatchSize:
-    """How much to run: game-steps per repeat, repeats."""
+    """Size of a measurement: game steps per repeat, and repeats."""
 
     game_steps: int = 25_600
     repeats: int = 5
@@ -57,7 +56,7 @@ class BatchSize:
 
 @dataclass(frozen=True)
 class BatchRun:
-    """Games at once: rules, policy of both teams, whether blue is shielded, how many games, threads of the shield."""
+    """A batch of games: rules, policy of both teams, whether blue is shielded, number of games, shield threads."""
 
     preset: str
     policy: str
@@ -77,10 +76,9 @@ def time_calls(call: Callable[[int], Any], times: int) -> Times:
 
 
 def quantiles_us(repeats: Sequence[Times]) -> dict[str, float | None]:
-    """Quantiles over calls, each call counting with the median of its repeats; None without calls.
+    """Return quantiles over calls, using each call's median over the repeats; None without calls.
 
-    The calls compute the same thing in every repeat, so that the median leaves out what other processes of the
-    machine did to single ones.
+    The calls compute the same in every repeat, so the median removes disturbance by other processes.
     """
     if not repeats or not len(repeats[0]):
         return dict.fromkeys(QUANTILES)
@@ -97,19 +95,19 @@ class Question:
     surroundings: Surroundings | None
 
     def ask(self, shield: Shield) -> Decisions:
-        """Let a shield answer it."""
+        """Return a shield's answer."""
         return shield.decide(self.fleet, self.wanted, self.surroundings)
 
 
 class _KeepingShield(Shield):
-    """A shield that keeps what it is asked, and the programs it then solves with `REFERENCE`."""
+    """A shield that stores its questions, or the programs it solves, then with `REFERENCE`."""
 
     def __init__(self, config: ShieldConfig, programs: bool = False) -> None:
         super().__init__(config)
         self.questions, self.programs, self._keeps_programs = list[Question](), list[Program](), programs
 
     def decide(self, fleet: Fleet, wanted: Commands, surroundings: Surroundings | None = None) -> Decisions:
-        """Keep a copy of the question (the game changes its arrays in place), then answer it."""
+        """Store a copy of the question (the game changes its arrays in place), then answer it."""
         if not self._keeps_programs:
             kept = replace(fleet, state=fleet.state.copy(), controlled=fleet.controlled.copy())
             self.questions.append(Question(kept, replace(wanted, values=wanted.values.copy()), surroundings))
@@ -134,7 +132,7 @@ def questions_of_games(
     own: str = "medium",
     opponents: Sequence[str] = OPPONENTS,
 ) -> list[list[Question]]:
-    """Play one shielded game of a policy against each opponent and keep every question, game by game."""
+    """Play one shielded game of a policy against each opponent; return all questions, game by game."""
     found = []
     for number, opponent in enumerate(opponents, start=seed):
         rules = {"max_time_s": game_s}
@@ -157,7 +155,7 @@ def answer_all(shield: Shield, games: Games) -> list[Decisions]:
 
 
 def programs_of(games: Games, config: ShieldConfig, most: int, seed: int) -> list[Program]:
-    """Collect the programs the shield solves on these questions, at most ``most``, drawn at random."""
+    """Return at most ``most`` of the programs that the shield solves on these questions, drawn at random."""
     shield = _KeepingShield(config, programs=True)
     answer_all(shield, games)
     chosen = np.random.default_rng(seed).permutation(len(shield.programs))[:most]
@@ -178,7 +176,7 @@ def decide_times(games: Games, config: ShieldConfig, repeats: int) -> dict[str, 
         times = []
         for game in games:
             shield.reset()
-            game[0].ask(shield)  # makes working memory for the fleet
+            game[0].ask(shield)  # allocates working memory for the fleet
             times.append(time_calls(lambda k, game=game: game[k].ask(shield), len(game)))
         runs.append(np.concatenate(times))
     return {
@@ -192,17 +190,17 @@ def decide_times(games: Games, config: ShieldConfig, repeats: int) -> dict[str, 
 
 @kernel
 def _check(scene: Scene) -> int:
-    """The nominal check alone; how many groups of boats do not pass it."""
+    """Run only the nominal check; return the number of groups of boats that fail it."""
     load_decision(0, scene)
     return begin(scene)
 
 
 def stage_times(games: Games, config: ShieldConfig, repeats: int) -> list[dict[str, Any]]:
-    """Time the `PARTS` of every decision of real games: per kind of `STAGES` its shares and the means of the parts."""
+    """Time the `PARTS` of every decision of real games; return shares and mean times per kind of `STAGES`."""
     shield, found = Shield(config), list[tuple[int, list[float]]]()
     for game in games:
         shield.reset()
-        game[0].ask(shield)  # makes working memory for the fleet
+        game[0].ask(shield)  # allocates working memory for the fleet
         found += [_parts_of(shield, question, repeats) for question in game[1:]]
     kinds, times = np.array([kind for kind, _ in found]), np.array([spent for _, spent in found])
     rows = []
@@ -215,7 +213,7 @@ def stage_times(games: Games, config: ShieldConfig, repeats: int) -> list[dict[s
 
 
 def _parts_of(shield: Shield, question: Question, repeats: int) -> tuple[int, list[float]]:
-    """Number of the decision's kind, and times in us in the order of `PARTS`; the shield goes on as it does anyway."""
+    """Return the kind of a decision and its times in us, as `PARTS`; the shield's state is then as after one call."""
     live = shield.remembered
     before = {name: array.copy() for name, array in live.items()}
     scene: Scene = shield._deciders.scene  # type: ignore[union-attr]
@@ -237,7 +235,7 @@ def _parts_of(shield: Shield, question: Question, repeats: int) -> tuple[int, li
 
 
 def scene(boats: int, seed: int, platform: str = "heron", area_per_boat_m2: float = 533.0) -> tuple[Fleet, Commands]:
-    """Draw a fleet, half of it ours, as dense as six boats in an 80 x 40 m field, and where all want to go."""
+    """Draw a fleet, half of it own boats, as dense as six in an 80 x 40 m field, and random nominal commands."""
     rng = np.random.default_rng([boats, seed])
     side_m = float(np.sqrt(boats * area_per_boat_m2))
     places = np.zeros((0, 2))
@@ -256,13 +254,13 @@ def scene(boats: int, seed: int, platform: str = "heron", area_per_boat_m2: floa
 
 
 def scaled(config: ShieldConfig, platform: str, boats: int, scenes: int, seed: int) -> dict[str, Any]:
-    """Time one decision, and its `PARTS`, in random scenes of so many boats, half of them ours."""
+    """Time one decision and its `PARTS` in random scenes of that many boats, half of them own."""
     shield, times, parts, ours = Shield(config), np.zeros(scenes), list[list[float]](), 0
     for k in range(scenes):
         question = Question(*scene(boats, seed + k, platform), None)
         ours = int(question.fleet.controlled.sum())
         shield.reset()
-        question.ask(shield)  # makes working memory and the backups the timed decision goes on from
+        question.ask(shield)  # allocates working memory and finds the backups that the timed decision starts from
         parts.append(_parts_of(shield, question, 1)[1])
         times[k] = parts[-1][0]
     figures = quantiles_us([times])
@@ -316,11 +314,11 @@ def _gradients(tables: Tables, places: Array, out: Array) -> None:
         x, y, own, other, own_mps, other_mps = places[k]
         slope = table_gradient(tables, 0, WHOLE_S, x, y, own, other, own_mps, other_mps)
         own_part = slope.own_x + slope.own_y + slope.own_heading + slope.own_speed
-        out[k] = slope.value_m + own_part + slope.other_heading + slope.other_speed  # all of it is computed
+        out[k] = slope.value_m + own_part + slope.other_heading + slope.other_speed  # so that all of it is computed
 
 
 def lookup_times(lookups: int, repeats: int, seed: int) -> list[dict[str, Any]]:
-    """Median over repeats of the mean time of look-ups, us, each far from the last: caches help little."""
+    """Return the median over repeats of the mean look-up time, us; random places leave caches little use."""
     own, other = (get_platform(name) for name in PAIR)
     tables = stack_tables([load_table(own, other, OtherMay.WORST_CASE)])
     draw = np.random.default_rng(seed)
@@ -337,9 +335,9 @@ def lookup_times(lookups: int, repeats: int, seed: int) -> list[dict[str, Any]]:
 
 
 def steps_per_s(runs: Sequence[BatchRun], size: BatchSize, seed: int, shield: ShieldConfig) -> list[dict[str, Any]]:
-    """Game-steps per second with observations and rewards, both teams of one policy, whose own time is left out.
+    """Measure game steps per second with observations and rewards; the policy's own time is excluded.
 
-    All runs take turns in every repeat, so that what slows the machine for a while slows them alike.
+    Runs alternate in every repeat, so that a temporarily slow machine affects all alike.
 
     Returns:
         Per run its fields, and `median`, `low` and `high` over the repeats, per second.
@@ -353,7 +351,7 @@ def steps_per_s(runs: Sequence[BatchRun], size: BatchSize, seed: int, shield: Sh
 
 
 class _Batch:
-    """The games of a run, played on from repeat to repeat."""
+    """The games of a run, continued from repeat to repeat."""
 
     def __init__(self, run: BatchRun, seed: int, shield: ShieldConfig) -> None:
         self._core = core = BatchedMctf(
@@ -382,7 +380,7 @@ class _Batch:
 
 
 def memory_mib(make: Callable[[], Any]) -> float:
-    """Memory that the object ``make()`` builds holds, MiB; numpy reports its arrays to tracemalloc."""
+    """Return the memory held by the object that ``make()`` builds, MiB; numpy reports its arrays to tracemalloc."""
     tracemalloc.start()
     try:
         before = tracemalloc.get_traced_memory()[0]
@@ -395,8 +393,8 @@ def memory_mib(make: Callable[[], Any]) -> float:
 
 
 def batch_memory(preset: str, games: int, shield: ShieldConfig) -> dict[str, Any]:
-    """Memory of that many games with observations and rewards, and of one team's shield for them, MiB."""
-    games_shield(BatchedMctf(preset, 1, 0), shield)  # compiles: that memory belongs to no game
+    """Return the memory of that many games with observations and rewards, and of one team's shield for them, MiB."""
+    games_shield(BatchedMctf(preset, 1, 0), shield)  # compiles first, so that this memory is not counted
     core = BatchedMctf(preset, games, 0)
     held = {"games_mib": lambda: BatchedMctf(preset, games, 0), "shield_mib": lambda: games_shield(core, shield)}
     return {"games": games, **{name: memory_mib(make) for name, make in held.items()}}

@@ -238,9 +238,7 @@ class View:
         tick = moment.tick
         if tick is None:
             return boats_table(width, [])
-        contacts = {
-            contact.boat: contact for contact in reversed(tick.contacts)
-        }  # of a boat's contacts the first counts
+        contacts = {contact.boat: contact for contact in reversed(tick.contacts)}  # a boat's first contact counts
         decisions = {} if tick.decisions is None else {decision.boat: decision for decision in tick.decisions}
         near = {} if tick.fleet is None else approaches(tick.fleet)
         rows = []

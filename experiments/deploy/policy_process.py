@@ -40,28 +40,28 @@ HEALTHY_S = 30.0
 
 
 class PolicyProcess:
-    """A `WantedSource`: shows snapshots to a policy elsewhere and gives its latest answer. A context manager.
+    """A `WantedSource`: sends snapshots to a policy's process and returns its latest answer. A context manager.
 
-    At most one snapshot is on its way; of those that come meanwhile the latest waits. A policy that dies or does not
-    answer within ``deadline_s`` is ended, with all processes it started, and started again after a pause.
+    At most one snapshot is in flight; of later ones only the latest waits. A policy that dies or does not answer within
+    ``deadline_s`` is ended with all processes it started, and restarted after a pause.
 
     Args:
         fleet: the file.
         policy: name or path, as `steerclear.policies.make` takes it.
-        deadline_s: time an answer may take, s of the machine; None: the file's limits.policy.give_up_after_s.
+        deadline_s: time for an answer, wall-clock s; None: the file's limits.policy.give_up_after_s.
         clock: clock of the snapshots; None: the machine's.
-        boats: names of the boats it plays; None: all that a process commands for our team.
+        boats: names of the boats it plays; None: all that a process commands for the team.
         options: of the policy.
-        seed: of what the policy draws.
-        start_within_s: time it has to load, s of the machine.
+        seed: of the policy's random draws.
+        start_within_s: time to load, wall-clock s.
 
     Attributes:
         policy: its short name, for messages.
-        restarts: how often it was started again.
-        refused: why it could not be loaded at the last start; empty: it could.
+        restarts: number of restarts.
+        refused: why the last start could not load it; empty if it could.
 
     Raises:
-        FleetFileError: the file has no game and the policy needs one, or one of the boats does not play.
+        FleetFileError: the policy needs a game and the file has none, or one of the boats does not play.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Settings of simulated boats: who they are, how their autopilots behave, the water and the radio."""
+"""Settings of simulated boats: identity, autopilot, water and radio."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import Platform
 
 FREE = ""
-"""Address of a boat that chooses a free port itself."""
+"""Address of a boat that picks a free port itself."""
 _MOST = 1e9
 
 
 def check_bounds(settings: object, **bounds: tuple[float, float]) -> None:
-    """Raise unless these attributes are numbers within their bounds.
+    """Check that these attributes are numbers within their bounds.
 
     Raises:
         ConfigError: one of them is not.
@@ -31,15 +31,15 @@ class SimBoat:
 
     Attributes:
         name: its name.
-        platform: its dynamics, a name or a `Platform`.
+        platform: dynamics, a name or a `Platform`.
         team: 0 blue, 1 red.
-        system_id: MAVLink system id; 0: its place in the list + 1.
-        address: where its link is, as the runner's side has it: ``udpin:HOST:PORT`` (the boat sends there),
+        system_id: MAVLink system id; 0: position in the list + 1.
+        address: its link, as the runner opens it: ``udpin:HOST:PORT`` (the boat sends there),
             ``udpout:HOST:PORT`` (the boat listens there), ``tcp:HOST:PORT`` (the boat is the server),
-            ``tcpin:HOST:PORT`` (the boat dials); `FREE`: ``udpout`` with a free port; None: no link.
-        policy: scripted policy that drives the boat while nobody commands it by its link; empty: without commands it
+            ``tcpin:HOST:PORT`` (the boat connects); `FREE`: ``udpout`` with a free port; None: no link.
+        policy: scripted policy that steers the boat while nobody commands it by its link; empty: without commands it
             stays where it is.
-        start: x m, y m, heading deg in the field; None: the game's start place.
+        start: x m, y m, heading deg in the field; None: the game's start.
         gate: of a boat that runs MOOS: where its commander sits, "helm" or "pid", as in FLEET.yaml.
     """
 
@@ -55,19 +55,19 @@ class SimBoat:
 
 @dataclass(frozen=True)
 class AutopilotSettings:
-    """How an autopilot behaves; the defaults are what was measured.
+    """Behaviour of an autopilot; defaults are measured values.
 
     Attributes:
-        boot_s: from power on until it arms with all checks; its position is there after 9/42 of this, and ATTITUDE is
-            not to be believed for 1/42 of it.
+        boot_s: from power on until it arms with all checks. It has a position after 9/42 of this; ATTITUDE is invalid
+            for the first 1/42.
         timeout_s: commands older than this are dropped.
-        brake_mps2: deceleration of a stop of the autopilot's own (time-out, LOITER); None: the platform's own way.
-        back_up_m: run astern after the stop of a time-out.
+        brake_mps2: deceleration of the autopilot's own stops (time-out, LOITER); None: as the platform stops.
+        back_up_m: distance run astern after a time-out stop.
         top_rate_hz: highest rate of one message.
-        parameters: values of parameters that differ from the defaults, by name.
+        parameters: autopilot parameters that differ from the defaults, by name.
 
     Raises:
-        ConfigError: a number out of range.
+        ConfigError: a number is out of range.
     """
 
     boot_s: float = 42.0
@@ -85,12 +85,12 @@ class AutopilotSettings:
 
 @dataclass(frozen=True)
 class Water:
-    """Wind and current; directions are where the wind comes from and where the current goes to, true deg.
+    """Wind and current, in true degrees: where the wind comes from, where the current goes to.
 
     Attributes:
         wind_mps, wind_from_deg: mean wind.
         gust_share: standard deviation of gusts as a share of the mean wind.
-        leeway_share: speed a boat is pushed with as a share of the wind's.
+        leeway_share: drift speed of a boat as a share of the wind speed.
         current_mps, current_to_deg: the current.
 
     Raises:
@@ -110,21 +110,21 @@ class Water:
 
     @property
     def is_still(self) -> bool:
-        """Neither wind nor current."""
+        """Whether there is neither wind nor current."""
         return self.wind_mps == 0.0 and self.current_mps == 0.0
 
 
 @dataclass(frozen=True)
 class RadioSettings:
-    """What the radio does to every packet, in either direction.
+    """Effect of the radio on every packet, in either direction.
 
     Attributes:
         loss: share of packets lost.
         delay_s: one way.
-        jitter_s: further delay, drawn for each packet from 0 to this; packets may overtake each other.
+        jitter_s: extra delay, drawn per packet between 0 and this; packets may overtake each other.
 
     Raises:
-        ConfigError: a number out of range.
+        ConfigError: a number is out of range.
     """
 
     loss: float = 0.0

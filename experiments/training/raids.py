@@ -41,7 +41,7 @@ PLACE = (
 TURNED = (L.RUDDER, L.HEADING_ERROR, L.HEADING_INTEGRAL, L.TURN_RATE)
 """Entries of a boat's state that change sign when mirrored."""
 KINDS = ("bait", "drag", "run", "flag", "alone", "alone_flag")
-"""Kinds of start states: the phase the raid enters, or that it took the flag; the last two are of single boats."""
+"""Kinds of start states: phase that the raid enters, or "flag" once taken; the last two if the flag is unguarded."""
 LONGEST_S = 100.0
 """Game time after which a game that began in a raid is ended, s."""
 RECORDED_SEED = 810_000
