@@ -213,9 +213,13 @@ def bench(
     """
     settings = replace(BenchSettings(), preset=preset, seed=seed)
     with err().status("measuring") as status:
-        content = run_bench(
-            settings.small() if quick else settings, lambda words: status.update(Text(f"measuring: {words}"))
-        )
+
+        def notice(words: str) -> None:
+            status.update(Text(f"measuring: {words}"))
+            if not err().is_terminal:
+                err().print(f"measuring: {words}", soft_wrap=True)
+
+        content = run_bench(settings.small() if quick else settings, notice)
     machine = content["machine"]
     say(f"{machine['processor']}, {machine['cores']} cores, {machine['system']}", "")
     for table in bench_tables(content):

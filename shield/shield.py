@@ -83,10 +83,8 @@ class Shield:
         self._deciders: Deciders | None = None
         self._known: tuple[Any, ...] | None = None
         self._missing: BoolArray | None = None
-        self._highest_mps, self._bound = (
-            np.zeros(0),
-            np.zeros(0, np.int64),
-        )  # of boats, and of active constraints, in their order
+        self._highest_mps = np.zeros(0)  # of boats, in the fleet's order
+        self._bound = np.zeros(0, np.int64)  # active constraints in the fleet's order; negative indices are used, too
         self._autopilots: Autopilots | None = None
         self.serves: object | None = None
 
@@ -291,9 +289,7 @@ class Shield:
                 self._autopilots.carry_over(believed, stayed, then)
         self._deciders, self._known = new, (known, keys)
         self._highest_mps = boats.params[place, L.MAX_SPEED]
-        self._bound = np.concatenate(
-            [order, np.arange(STATIC - len(self.config.barriers), 0)]
-        )  # negative indices are used, too
+        self._bound = np.concatenate([order, np.arange(STATIC - len(self.config.barriers), 0)])
         return new
 
     def _solver(self) -> Solver | None:

@@ -23,8 +23,8 @@ def test_there_are_as_many_blocks_as_are_run_here():
     assert len(BLOCKS) == 2
 
 
-def test_fifteen_lines_print_what_is_said(capsys):
-    said = re.search(r"## Fifteen lines.*?```text\n(.*?)\n```", README, flags=re.DOTALL).group(1)
+def test_one_decision_prints_what_is_said(capsys):
+    said = re.search(r"## One decision.*?```text\n(.*?)\n```", README, flags=re.DOTALL).group(1)
     assert printed(BLOCKS[0], capsys) == said
 
 

@@ -155,8 +155,10 @@ class PolicyProcess:
         waited_s = now_s - self._since_s
         if not self._ready and waited_s > self._start_within_s:
             self._lose(f"did not load within {self._start_within_s:g} s", now_s)
-        elif self._asked is not None and waited_s > (self._deadline_s if self._answered else self._start_within_s):
-            self._lose(f"did not answer within {self._deadline_s:g} s", now_s)
+        elif self._asked is not None and waited_s > (
+            within_s := self._deadline_s if self._answered else self._start_within_s
+        ):
+            self._lose(f"did not answer within {within_s:g} s", now_s)
         elif now_s - self._healthy_s > HEALTHY_S:
             self._pause_s = FIRST_PAUSE_S
 

@@ -293,5 +293,5 @@ def sea_trial(
     driven = names if only is None else (run.fleet.boat(only).name,)
     warm_up(run.fleet)
     trial = SeaTrial(run.fleet, driven, speed_mps, tell, run.operator)
-    outcome = run_boats(run, "sea-trial", lambda boats: boats.sail(trial, longest_s(len(names)), (trial,)))
+    outcome = run_boats(run, "sea-trial", lambda boats: boats.sail(trial, longest_s(len(driven)), (trial,)))
     return outcome, trial if outcome.log is not None else None
