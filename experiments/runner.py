@@ -191,6 +191,8 @@ def execute(
             notice(len(kept), len(ids))
     except KeyboardInterrupt:
         interrupted = True
+        written = read_rows(folder / ROWS_FILE)  # what came between writing a job and counting it counts, too
+        kept = {name: written[name] for name in ids if name in written}
     rows = [row for name in dict.fromkeys(ids) for row in kept.get(name, ())]
     wall_s = time.perf_counter() - started
     run = Run(experiment, folder, rows, failed, len(kept), resumed, interrupted, wall_s, lock)

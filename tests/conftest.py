@@ -3,6 +3,8 @@
 import logging
 import subprocess
 import sys
+import threading
+import time
 
 import numpy as np
 import pytest
@@ -24,6 +26,44 @@ def pytest_configure(config):
     shares = [subprocess.Popen([sys.executable, "-c", COMPILING.format(k, workers)]) for k in range(workers)]
     for share in shares:  # what goes wrong is for the tests to tell
         share.wait()
+
+
+class Stall:
+    """The longest time this process was not let run while the block ran, s: a busy machine, not the tested code."""
+
+    def __enter__(self):
+        self.longest_s, self._over = 0.0, threading.Event()
+        self._watch = threading.Thread(target=self._measure, daemon=True)
+        self._watch.start()
+        return self
+
+    def __exit__(self, *_):
+        self._over.set()
+        self._watch.join()
+
+    def _measure(self):
+        before = time.monotonic()
+        while not self._over.wait(0.02):
+            now = time.monotonic()
+            self.longest_s, before = max(self.longest_s, now - before), now
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_pyfunc_call(pyfuncitem):
+    """Try a test marked ``real_time`` again, twice at most, if it failed while the machine stood still for a while."""
+    if pyfuncitem.get_closest_marker("real_time") is None:
+        return None
+    arguments = {name: pyfuncitem.funcargs[name] for name in pyfuncitem._fixtureinfo.argnames}
+    for tries_left in (2, 1, 0):
+        stall = Stall()
+        try:
+            with stall:
+                pyfuncitem.obj(**arguments)
+            break
+        except AssertionError:
+            if stall.longest_s < 0.25 or not tries_left:
+                raise
+    return True
 
 
 @pytest.fixture(autouse=True)

@@ -51,7 +51,9 @@ def test_every_example_is_run_and_shown():
     assert names == set(SAYS)
 
 
-@pytest.mark.parametrize("name", SAYS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.real_time) if name == "policy_over_moos" else name for name in SAYS]
+)
 def test_an_example_runs(name, capsys, monkeypatch):
     monkeypatch.setattr(sys, "argv", [name, str(LOG)])
     runpy.run_path(str(EXAMPLES / f"{name}.py"), run_name="__main__")

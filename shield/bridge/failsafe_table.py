@@ -145,8 +145,8 @@ CONDITIONS = {
             "contact.doubt",
             "Sources contradict each other about another boat.",
             "places that cannot be one boat's, two programs under one name",
-            "`contact.then`, and boats keep clear of every place told; `contact.lost_then` where more than 3 are told, or "
-            "one to no better than 10 m",
+            "`contact.then`, and boats keep clear of every place told; `contact.lost_then` where more than 3 are told, "
+            "or one to no better than 10 m",
         ),
         Condition(
             "game.old",

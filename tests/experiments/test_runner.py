@@ -91,6 +91,20 @@ def test_a_job_that_kills_its_worker_costs_no_other_job(tmp_path):
     assert "--resume" in run.failed[0]["error"]
 
 
+def test_an_interruption_right_after_a_job_is_written_counts_that_job(tmp_path, monkeypatch):
+    append = runner.append_row
+
+    def interrupted_once_written(*arguments):
+        append(*arguments)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(runner, "append_row", interrupted_once_written)
+    run = execute(experiment("", ""), tmp_path / "out")
+    lines = (tmp_path / "out" / "rows.jsonl").read_text().splitlines()
+    assert (run.interrupted, run.finished, len(lines)) == (True, 1, 1)
+    assert len(run.rows) == 1
+
+
 def test_an_interrupted_run_is_gone_on_with(tmp_path, caplog):
     stopped = execute(experiment("", "", "stop", ""), tmp_path)
     assert (stopped.interrupted, stopped.finished) == (True, 2)
