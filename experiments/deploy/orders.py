@@ -42,7 +42,7 @@ class Kept(BaseModel):
     """A stored preflight.
 
     Attributes:
-        fleet: fingerprint of the fleet file's text; a changed file needs a new drill.
+        fleet: fingerprint of the fleet file's text and its boats' platforms; what has changed needs a new drill.
         unix_s: end time, s since 1970.
         refused: names of checks neither passed nor accepted.
         checks: all results.
@@ -66,7 +66,7 @@ def keep(fleet: FleetFile, text: str, boat: str | None, results: Sequence[CheckR
         replace(one, figures={name: float(value) for name, value in one.figures.items() if math.isfinite(value)})
         for one in results
     ]
-    kept = Kept(fleet=_fingerprint(text), unix_s=time.time(), refused=list(refused), checks=checks)
+    kept = Kept(fleet=_fingerprint(fleet, text), unix_s=time.time(), refused=list(refused), checks=checks)
     path = path_of(fleet, boat)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -86,7 +86,7 @@ def check_drill(
 ) -> CheckResult:
     """Check that these boats were drilled recently, with this very file, and moved as their platforms predict."""
     found = _read(path_of(fleet, boat))
-    why = "no preflight of these boats" if found is None else _outdated(found, text, commanded)
+    why = "no preflight of these boats" if found is None else _outdated(found, _fingerprint(fleet, text), commanded)
     if found is None or why:
         return CheckResult("drill", False, f"{why}; run steerclear preflight first")
     texts = {check.name: check.text for check in found.checks}
@@ -109,14 +109,18 @@ def measured_delay_s(fleet: FleetFile, boat: str | None) -> float | None:
     return max((delay for delay in delays if delay is not None), default=None)
 
 
-def _fingerprint(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()
+def _fingerprint(fleet: FleetFile, text: str) -> str:
+    """Digest of the fleet file and of every boat's model, which may lie in a file of its own."""
+    models = [
+        repr((name, platform, dict(fleet.measured_of(name)))) for name, platform in sorted(fleet.platform_of.items())
+    ]
+    return hashlib.sha256("\n".join([text, *models]).encode()).hexdigest()
 
 
-def _outdated(found: Kept, text: str, commanded: Sequence[str]) -> str:
+def _outdated(found: Kept, fingerprint: str, commanded: Sequence[str]) -> str:
     """Return why a preflight does not count for these boats, or an empty string."""
-    if found.fleet != _fingerprint(text):
-        return "the fleet file has changed since its preflight"
+    if found.fleet != fingerprint:
+        return "the fleet file, or a platform file that it names, has changed since its preflight"
     age_s = time.time() - found.unix_s
     if not 0.0 <= age_s <= VALID_S:
         return f"the last preflight is {age_s / 3600.0:.0f} h old"

@@ -52,7 +52,7 @@ CONDITIONS = {
         Condition(
             "mode.pilot",
             "A pilot takes a boat, or disarms it.",
-            "its heartbeat",
+            "its heartbeat, four a second",
             "nothing is sent to it; the others keep clear of it",
             within="0.5 s",
             returns=_BY_KEY,
@@ -60,11 +60,11 @@ CONDITIONS = {
         Condition(
             "mode.failsafe",
             "The autopilot's own fail-safe takes a boat.",
-            "its heartbeat, and the autopilot's word in the same seconds",
+            "its heartbeat, four a second, and the autopilot's word within 3 s",
             "nothing is sent to it; the others keep clear of it",
             within="0.5 s",
             returns=(
-                "once the autopilot says it is over: wait (the operator takes it back) or retake; now `after_failsafe`"
+                "the operator takes it back once the autopilot says it is over, or the loop does with retake; set: `after_failsafe`"
             ),
         ),
         Condition(

@@ -3,6 +3,7 @@
 import contextlib
 import json
 import socket
+from dataclasses import replace
 
 import pytest
 from json_keys import KEYS, undocumented
@@ -31,6 +32,8 @@ from steerclear.shield.bridge.fleet_file import load_fleet
 from steerclear.shield.bridge.preflight_checks import CheckResult
 from steerclear.shield.bridge.session import VehicleSession
 from steerclear.shield.exceptions import ConfigError, FleetFileError, LinkError, PolicyError
+from steerclear.shield.platforms import get_platform
+from steerclear.shield.platforms.files import PlatformFile, to_text
 from typer.testing import CliRunner
 
 SPEED = 5.0
@@ -320,6 +323,18 @@ def test_a_drill_counts_for_the_same_file_for_a_while_and_when_it_passed(fleet_f
     assert "h old" in check().text
     path_of(fleet, None).write_text("{")
     assert "no preflight" in check().text
+
+
+def test_a_new_fit_under_the_same_name_asks_for_a_new_drill(fleet_file):
+    model, first = fleet_file.parent / "mine.yaml", replace(get_platform("heron"), name="mine")
+    model.write_text(to_text(PlatformFile(first)))
+    text = fleet_file.read_text().replace("platform: heron\n", "platform: mine.yaml\n")
+    fleet_file.write_text(text)
+    keep(load_fleet(fleet_file), text, None, [good("course"), good("response"), good("model")], [])
+    assert check_drill(load_fleet(fleet_file), text, None, ["blue_1"]).passed
+    for fitted in (PlatformFile(replace(first, max_speed_mps=1.9)), PlatformFile(first, {"delay_s": 0.4})):
+        model.write_text(to_text(fitted))
+        assert "platform file" in check_drill(load_fleet(fleet_file), text, None, ["blue_1"]).text
 
 
 @pytest.mark.parametrize(
