@@ -64,7 +64,8 @@ CONDITIONS = {
             "nothing is sent to it; the others keep clear of it",
             within="0.5 s",
             returns=(
-                "the operator takes it back once the autopilot says it is over, or the loop does with retake; set: `after_failsafe`"
+                "the operator takes it back once the autopilot says it is over, or the loop does with retake; "
+                "set: `after_failsafe`"
             ),
         ),
         Condition(
