@@ -115,7 +115,7 @@ class BatchedShield:
     def decide(
         self,
         state: Array,
-        wanted: Array,
+        nominal: Array,
         ours: BoolArray,
         visiting: BoolArray | None = None,
         driven: Array | None = None,
@@ -125,7 +125,7 @@ class BatchedShield:
         Args:
             state: (B, n, N_STATE) boat states; autopilot memory that is NaN is filled from the speed, not estimated as
                 `Shield` does.
-            wanted: (B, n, 2) nominal speed m/s and relative heading deg, as `Commands.game_deg`: games limit speeds
+            nominal: (B, n, 2) nominal speed m/s and relative heading deg, as `Commands.game_deg`: games limit speeds
                 themselves.
             ours: (B, n) boats to decide for.
             visiting: (B, n) boats on the other team's side, see `Fleet.visiting`; None: not known of any.
@@ -133,16 +133,16 @@ class BatchedShield:
                 nothing is known. Those not decided for are predicted accordingly.
 
         Returns:
-            (B, n, 2) commands; rows of boats not decided for, and of those that pass, are ``wanted`` bit for bit. The
+            (B, n, 2) commands; rows of boats not decided for, and of those that pass, are ``nominal`` bit for bit. The
             next call overwrites the array. ``reason`` and ``safety_margin_m`` (B, n) say why; ``cut_short`` (B,) which
             decisions `ShieldConfig.work_budget` ended.
 
         Raises:
             FleetError: an array has the wrong shape or holds no numbers, or a state is not finite.
         """
-        wanted = shaped("wanted", wanted, (*self.reason.shape, 2))
+        nominal = shaped("nominal", nominal, (*self.reason.shape, 2))
         self._give(state, ours, visiting, driven)
-        self._deciders.scene.given[:, :, NOMINAL] = wanted
+        self._deciders.scene.given[:, :, NOMINAL] = nominal
         self._barriers.renew()
         self._deciders.decide(self._static)
         self._barriers.tell()

@@ -141,7 +141,7 @@ class Commands:
         first = int(np.argmax(cut))
         say_once(
             "speed",
-            f"a speed of {speed[first]:g} m/s is wanted of boat {names[first]!r}, whose platform does 0 to "
+            f"a speed of {speed[first]:g} m/s is requested of boat {names[first]!r}, whose platform does 0 to "
             f"{highest_mps[first]:g} m/s; it is cut to that (reason LIMITED). Rows are (speed m/s, heading), in this "
             "order",
         )

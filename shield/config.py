@@ -56,7 +56,7 @@ class ShieldConfig:
     buffer_m: float = _number(0.05, 50.0)  # added to the separation for rounding and sampling
     dt_s: float = _number(0.1, 2.0, 0.01)  # step of the decision loop,
     move_s: float | None = _number(None, 1.0, 0.01)  # and of the boat model, if a command is held for several
-    opponent_model: str = "auto"  # how opponents are predicted, see `backup.family.CERTIFICATES`
+    opponent_model: str = "auto"  # how opponents are predicted, see `backup.family.OPPONENT_MODELS`
     coordination: str = "team"  # one decision for all own boats; "per_boat": one each, for boats that cannot talk
     solver: str = "active_set"  # of the QP: this one (a historical name) is compiled, others are of qpsolvers
     adversary_horizon_s: float | None = _number(None)  # how long an opponent is adversarial; None: the profile's
@@ -86,7 +86,7 @@ class ShieldConfig:
     barriers: tuple[str, ...] = ()  # names of registered barriers in force; in one text joined by "+"
 
     def __post_init__(self) -> None:
-        from .backup.family import CERTIFICATES
+        from .backup.family import OPPONENT_MODELS
         from .filter.program import check_solver
 
         object.__setattr__(self, "barriers", _barriers(self.barriers))
@@ -99,7 +99,7 @@ class ShieldConfig:
         if self.profile in OLD_PROFILES:
             warn(self.profile, OLD_PROFILES[self.profile])
             object.__setattr__(self, "profile", OLD_PROFILES[self.profile])
-        choices: dict[str, Iterable[str]] = {"profile": PROFILES, "opponent_model": CERTIFICATES}
+        choices: dict[str, Iterable[str]] = {"profile": PROFILES, "opponent_model": OPPONENT_MODELS}
         for name, known in (choices | {"coordination": COORDINATION, "beyond_then": ("flee", "stop")}).items():
             if getattr(self, name) not in known:
                 raise ConfigError(f"unknown {name} {getattr(self, name)!r}; choose one of {', '.join(known)}")

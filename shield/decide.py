@@ -17,7 +17,7 @@ import numpy as np
 
 from . import workspace as W
 from .backup.assign import hold
-from .backup.rank import ALL, OBSTACLES, OPPONENTS
+from .backup.score import ALL, OBSTACLES, OPPONENTS
 from .barriers.boats import reported_margin
 from .barriers.clearance import MARGIN
 from .barriers.neighbours import note_predicted
@@ -28,7 +28,7 @@ from .filter.backup_switch import back_up
 from .filter.blend import any_may_be_blended, blend, verify
 from .filter.groups import close_groups, make_groups, open_group
 from .filter.last_line import keep_last_line
-from .filter.nominal import screen
+from .filter.nominal import check_nominal
 from .filter.program import Program, Solver
 from .filter.qp import ROUNDS, accept, among_mates, begin_program, end_program, linearise, solve
 from .filter.right_of_way import forget_deadlock, note_deadlock
@@ -71,10 +71,10 @@ def _one_of_one_team(scene: Scene) -> int:
 
 
 @lean_kernel
-def _reported_adversary_horizon(i: int, mate: int, scene: Scene) -> float:
+def _reported_adversary_horizon(i: int, own: int, scene: Scene) -> float:
     """Return how long boat i is adversarial, s: 0 if its way is predicted, NaN if it is nobody's opponent."""
     team = scene.boats.team
-    if scene.ours[i] or (mate >= 0 and team[i] == team[mate]):
+    if scene.ours[i] or (own >= 0 and team[i] == team[own]):
         return np.nan
     return 0.0 if scene.known[i] else scene.adversary_horizon_s[i]
 
@@ -111,7 +111,7 @@ def load_decision(b: int, scene: Scene) -> None:
 def store_decision(b: int, scene: Scene) -> None:
     """Store what decision b has come to, and what is remembered of it."""
     given, state, command, reported = scene.given[b], scene.state, scene.command, scene.reported[b]
-    mate = _one_of_one_team(scene)
+    own = _one_of_one_team(scene)
     for i in range(state.shape[0]):
         copy_row(scene.memories[b, i], scene.memory[i])
         sent = scene.sent[b, i]
@@ -133,7 +133,7 @@ def store_decision(b: int, scene: Scene) -> None:
         scene.changed[b, i], scene.reasons[b, i] = changed, reason
         reported[i, W.SLACK_M], reported[i, W.ACTIVE] = scene.slack_m[i], bound
         reported[i, W.CUT_SHORT] = 1.0 if scene.ours[i] and scene.cut_short[0] else 0.0
-        reported[i, W.ADVERSARY_HORIZON_S] = _reported_adversary_horizon(i, mate, scene)
+        reported[i, W.ADVERSARY_HORIZON_S] = _reported_adversary_horizon(i, own, scene)
         reported[i, W.SOLVER] = scene.solver[i] if reason == W.LEAST_CHANGE else 0
         reported[i, W.MARGIN_M] = np.inf if reason == W.NOT_COVERED else reported_margin(i, scene)
     if scene.pending.shape[1] > 0:
@@ -219,7 +219,7 @@ def _name_reasons(scene: Scene) -> None:
 @lean_kernel
 def begin(scene: Scene) -> int:
     """Check the nominal commands; return the number of groups in which one fails."""
-    screen(scene)
+    check_nominal(scene)
     return groups_left(scene)
 
 

@@ -127,10 +127,10 @@ class Decision:
         return tuple(None if value != value else value for value in values)
 
     def _cells(self) -> tuple[str, ...]:
-        wanted = f"{math.degrees(self.nominal_heading_rad) % 360.0:.1f}", f"{self.nominal_speed_mps:.2f}"
-        sent = f"{math.degrees(self.filtered_heading_rad) % 360.0:.1f}", f"{self.filtered_speed_mps:.2f}"
+        nominal = f"{math.degrees(self.nominal_heading_rad) % 360.0:.1f}", f"{self.nominal_speed_mps:.2f}"
+        filtered = f"{math.degrees(self.filtered_heading_rad) % 360.0:.1f}", f"{self.filtered_speed_mps:.2f}"
         margin = "-" if math.isinf(self.safety_margin_m) else f"{self.safety_margin_m:.2f}"
-        return (self.boat, *wanted, *sent, self.reason.name, ", ".join(self.active_constraints) or "-", margin)
+        return (self.boat, *nominal, *filtered, self.reason.name, ", ".join(self.active_constraints) or "-", margin)
 
 
 @accepts_old_names(DECISIONS)

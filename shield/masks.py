@@ -16,19 +16,19 @@ import numpy as np
 
 from .backup.assign import choose_manoeuvre, hold, settled
 from .backup.family import found_turn
-from .backup.rank import ALL, OPPONENTS, Rank, score_path
 from .backup.rollout import roll_out
+from .backup.score import ALL, OPPONENTS, Score, score_path
 from .barriers.clearance import FAR
 from .barriers.registered import unknown_at
 from .barriers.static import beyond_line
 from .decide import Deciders, load_decision
-from .filter.nominal import predict, screen
+from .filter.nominal import check_nominal, predict
 from .filter.right_of_way import apply_right_of_way
 from .jit import Array, BoolArray, copy_row, kernel, lean_kernel
 from .platforms import layout as L
 from .workspace import LARGEST_COMMAND, PASSED, Scene, Static
 
-SHORT_OF_ALL = Rank(OPPONENTS, -FAR)
+SHORT_OF_ALL = Score(OPPONENTS, -FAR)
 """Manoeuvres are scored only as far as needed to decide whether they satisfy everything."""
 
 
@@ -38,7 +38,7 @@ def _begin(b: int, scene: Scene) -> None:
     for i in range(scene.ours.shape[0]):
         if scene.ours[i]:
             scene.nominal[i, 0], scene.nominal[i, 1] = scene.state[i, L.SPEED], 0.0
-    screen(scene)
+    check_nominal(scene)
     for i in range(scene.ours.shape[0]):
         copy_row(scene.memory[i], scene.memories[b, i])
         if scene.ours[i]:

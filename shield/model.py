@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .backup.family import CERTIFICATES, Certificate
+from .backup.family import OPPONENT_MODELS, OpponentModel
 from .backup.paths import SAG_M
 from .config import ShieldConfig
 from .exceptions import TableError
@@ -88,7 +88,7 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
     """
     kinds, dt_s = tuple(get_platform(name) for name in platforms), config.model_s
     limits = [limits_of(kind, dt_s) for kind in kinds]
-    certificate = CERTIFICATES[config.opponent_model]
+    opponent_model = OPPONENT_MODELS[config.opponent_model]
     pursuers = config.effective_adversary_horizon_s > 0.0
     granted = 1.0 if pursuers else 0.0
     stride = max(1, min((_stride(kind, limit, dt_s) for kind, limit in zip(kinds, limits, strict=True)), default=1))
@@ -96,7 +96,7 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
     with_table = np.asarray((table >= 0).any(axis=1))
     params = np.array([kind.pack() for kind in kinds]).reshape(-1, L.N_PARAM)
     steady = np.minimum(params[:, L.MAX_THRUST], [limit.thrust for limit in limits])
-    manoeuvres, n_manoeuvres = _manoeuvres_of(certificate, kinds, with_table)
+    manoeuvres, n_manoeuvres = _manoeuvres_of(opponent_model, kinds, with_table)
     table_decay, decay = _decay(config.table_cbf_rate_per_s, config), _decay(config.cbf_rate_per_s, config)
     table_cap_m = _table_cap_m(config, tables)
     extra = [np.full(len(kinds), dt_s)] if config.moves > 1 else []
@@ -144,11 +144,11 @@ def _horizons(
     config: ShieldConfig, kinds: tuple[Platform, ...], limits: list[Limits], team: tuple[int, ...], sample_s: float
 ) -> dict[str, Any]:
     """Return for how many samples each boat's paths, pursuers and static constraints are followed."""
-    certificate, pursuers = CERTIFICATES[config.opponent_model], config.effective_adversary_horizon_s > 0.0
-    horizon_s = [config.horizon_s or certificate.horizon_s(kind, config.model_s) for kind in kinds]
+    opponent_model, pursuers = OPPONENT_MODELS[config.opponent_model], config.effective_adversary_horizon_s > 0.0
+    horizon_s = [config.horizon_s or opponent_model.horizon_s(kind, config.model_s) for kind in kinds]
     pursuit_s, thrust_s, chase_s = list(horizon_s), [0.0] * len(kinds), [0.0] * len(kinds)
     if pursuers:
-        pursuit_s = [max(own, certificate.pursuit_s(limit)) for own, limit in zip(horizon_s, limits, strict=True)]
+        pursuit_s = [max(own, opponent_model.pursuit_s(limit)) for own, limit in zip(horizon_s, limits, strict=True)]
         thrust_s = [limit.thrust_s for limit in limits]
         chase_s = [max(0.0, CHASE_S - value) for value in pursuit_s]
     static_s = [min(limit.half_turn_s + STATIC_REACTION_S, own) for own, limit in zip(horizon_s, limits, strict=True)]
@@ -199,7 +199,7 @@ def _uses_table(config: ShieldConfig, kind: Platform) -> bool:
     """Return whether a boat looks opponents up where there is a table; none exists for boats with a rate loop."""
     if config.effective_adversary_horizon_s <= 0.0 or kind.kind == "rate":
         return False
-    return CERTIFICATES[config.opponent_model].uses_table(limits_of(kind, config.model_s))
+    return OPPONENT_MODELS[config.opponent_model].uses_table(limits_of(kind, config.model_s))
 
 
 @lru_cache(maxsize=64)
@@ -213,10 +213,10 @@ def _table_or_none(own: Platform, other: Platform) -> ValueTable | None:
 
 
 def _manoeuvres_of(
-    certificate: Certificate, kinds: tuple[Platform, ...], with_table: BoolArray
+    opponent_model: OpponentModel, kinds: tuple[Platform, ...], with_table: BoolArray
 ) -> tuple[Array, IntArray]:
     """Return `Boats.manoeuvres` and `Boats.n_manoeuvres`."""
-    families = [certificate.manoeuvres(*boat) for boat in zip(kinds, with_table, strict=True)]
+    families = [opponent_model.manoeuvres(*boat) for boat in zip(kinds, with_table, strict=True)]
     manoeuvres = np.full((len(kinds), max((len(family) for family in families), default=0), 3), np.nan)
     for rows, family in zip(manoeuvres, families, strict=True):
         rows[: len(family)] = family

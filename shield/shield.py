@@ -379,16 +379,16 @@ def _write_fresh(given: Array, state: Array, ours: BoolArray, nominal: Array, or
         given[k, W.DRIVEN :] = np.nan
 
 
-def _check(fleet: Fleet, wanted: Commands, config: ShieldConfig) -> None:
+def _check(fleet: Fleet, nominal: Commands, config: ShieldConfig) -> None:
     """Raise a FleetError for arguments of another kind, or with values or shapes that cannot be used."""
-    if not isinstance(fleet, Fleet) or not isinstance(wanted, Commands):
+    if not isinstance(fleet, Fleet) or not isinstance(nominal, Commands):
         raise FleetError(
-            f"decide takes a Fleet and Commands, not {type(fleet).__name__} and {type(wanted).__name__}; build "
+            f"decide takes a Fleet and Commands, not {type(fleet).__name__} and {type(nominal).__name__}; build "
             "them with Fleet.of(...) and Commands.absolute_rad(...) or Commands.relative_deg(...)"
         )
     fleet.check()
-    if wanted.values.shape != (len(fleet), 2):
-        raise FleetError(f"commands of shape {wanted.values.shape} for {len(fleet)} boats; give one row per boat")
+    if nominal.values.shape != (len(fleet), 2):
+        raise FleetError(f"commands of shape {nominal.values.shape} for {len(fleet)} boats; give one row per boat")
     if fleet.age_s is not None and (fleet.age_s > config.max_track_age_s).any():
         worst = int(np.argmax(fleet.age_s))
         raise FleetError(

@@ -210,7 +210,7 @@ class Scene(NamedTuple):
     static_by: Annotated[IntArray, "n+1"]  # which of them it is from,
     static_known: Annotated[BoolArray, "n+1"]  # and whether these belong to the present path
     bound: Annotated[IntArray, "n+1"]  # active constraint: a boat, -1 none, -2 and below static ones
-    satisfied: Annotated[IntArray, "n"]  # level that it satisfies, see `backup.rank`,
+    satisfied: Annotated[IntArray, "n"]  # level that it satisfies, see `backup.score`,
     score_m: Annotated[Array, "n"]  # and the other entry of its score
     violates_known: Annotated[BoolArray, "n+1"]  # whether a required margin from boats whose way is known is violated
     violates_pursuers: Annotated[BoolArray, "n+1"]  # the same against pursuers

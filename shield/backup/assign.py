@@ -11,14 +11,14 @@ from ..jit import Array, BoolArray, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..workspace import Scene, all_spent
 from .family import FAMILY, FOUND, IN_MEMORY, candidate, found_turn, remembered
-from .rank import ALL, OBSTACLES, OPPONENTS, WORST, Rank, all_satisfy, better, is_no_better, score_path
 from .rollout import lay_placed, place_manoeuvre, roll_out
+from .score import ALL, OBSTACLES, OPPONENTS, WORST, Score, all_satisfy, better, is_no_better, score_path
 
 SWEEPS = 2
 
 
 @lean_kernel
-def _take(i: int, slot: int, rank: Rank, scene: Scene) -> None:
+def _take(i: int, slot: int, score: Score, scene: Scene) -> None:
     """Make the trial in ``slot`` boat i's manoeuvre."""
     for k in range(scene.path.shape[1]):
         copy_row(scene.path[i, k], scene.path[slot, k])
@@ -36,7 +36,7 @@ def _take(i: int, slot: int, rank: Rank, scene: Scene) -> None:
     scene.pursuers_known[i] = scene.pursuers_known[slot]
     scene.refused_by_table[i] = scene.refused_by_table[slot]
     scene.bound[i] = scene.bound[slot]
-    scene.satisfied[i], scene.score_m[i] = rank
+    scene.satisfied[i], scene.score_m[i] = score
 
 
 @lean_kernel
@@ -69,10 +69,10 @@ def choose_manoeuvre(i: int, wanted_mps: float, done: int, best_of: bool, scene:
             scene.spent[0] += scene.cost[i]
         else:
             lay_placed(i, trial, done, scene)
-            rank = score_path(i, trial, best, scene)
-            if better(rank, best):
-                best = rank
-                _take(i, trial, rank, scene)
+            score = score_path(i, trial, best, scene)
+            if better(score, best):
+                best = score
+                _take(i, trial, score, scene)
         if (done == 1 and scene.refused_by_table[trial]) or all_spent(scene):
             return
 

@@ -42,7 +42,7 @@ GENTLE_SHARES = (0.5, 0.25)
 
 SLOWING_TURNS_DEG = (45.0, 90.0, 180.0)
 SLOWING_SPEEDS = (0.5, 0.0)
-"""Turns below full speed, which boats that steer without thrust try as well, see `Certificate.slowing`."""
+"""Turns below full speed, which boats that steer without thrust try as well, see `OpponentModel.slowing`."""
 
 SLOW_TO_REGAIN_S = 5.0
 """Under "auto", boats that take longer than this to regain top speed look opponents up in value tables, s.
@@ -59,7 +59,7 @@ LONGEST_PURSUIT_S = 60.0
 
 
 @dataclass(frozen=True)
-class Certificate:
+class OpponentModel:
     """Families of backup manoeuvres, rows of (side, turn deg, speed), with their horizon.
 
     Attributes:
@@ -113,7 +113,7 @@ def _slowing() -> Array:
     return np.array(rows)
 
 
-TURNING_CIRCLE = Certificate(
+TURNING_CIRCLE = OpponentModel(
     "turning_circle",
     "distance kept on the best turning circle, either side, any exit; opponents may pursue with their granted share",
     rolled_out=_turning(TURNS_DEG),
@@ -135,7 +135,7 @@ AUTO = replace(
     tables="slow",
 )
 
-CERTIFICATES = {certificate.name: certificate for certificate in (AUTO, TURNING_CIRCLE, VALUE_TABLE)}
+OPPONENT_MODELS = {model.name: model for model in (AUTO, TURNING_CIRCLE, VALUE_TABLE)}
 
 
 @lean_kernel

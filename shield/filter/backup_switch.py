@@ -20,8 +20,8 @@ import numpy as np
 
 from ..backup.assign import assign_manoeuvres
 from ..backup.family import IN_MEMORY, candidate, remembered
-from ..backup.rank import ALL, BOATS, OBSTACLES, OPPONENTS, WORST, Rank, better, score_of, score_path
 from ..backup.rollout import roll_out
+from ..backup.score import ALL, BOATS, OBSTACLES, OPPONENTS, WORST, Score, better, score_of, score_path
 from ..barriers.boats import reported_margin
 from ..barriers.clearance import MARGIN
 from ..barriers.static import clear_of_near_obstacles
@@ -85,17 +85,17 @@ def command_backup(i: int, scene: Scene) -> None:
 
 
 @lean_kernel
-def _score_without_passed(i: int, slot: int, scene: Scene) -> Rank:
+def _score_without_passed(i: int, slot: int, scene: Scene) -> Score:
     """Score boat i's path in ``slot`` as if teammates whose nominal commands passed were absent."""
     ours = scene.ours
     for j in range(ours.shape[0]):
         if ours[j] and not scene.moving[j]:
             scene.near[i, j] = False
-    rank = score_path(i, slot, WORST, scene)
+    score = score_path(i, slot, WORST, scene)
     for j in range(ours.shape[0]):
         if ours[j] and not scene.moving[j]:
             scene.near[i, j] = scene.near[j, i]
-    return rank
+    return score
 
 
 @lean_kernel

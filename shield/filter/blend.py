@@ -8,7 +8,7 @@ have to give way for longer.
 from __future__ import annotations
 
 from ..backup.assign import rate
-from ..backup.rank import ALL, SAME_M
+from ..backup.score import ALL, SAME_M
 from ..jit import copy_row, lean_kernel
 from ..platforms import layout as L
 from ..platforms.actuator import command_for_turn
@@ -91,10 +91,10 @@ def _mildest_turn(i: int, scene: Scene) -> float:
 
     A turn against the backup would have to be undone in the next step.
     """
-    wanted, backup = scene.checked_turn[i], scene.verified[i, TURN]
-    if wanted * backup <= 0.0:
+    nominal, backup = scene.checked_turn[i], scene.verified[i, TURN]
+    if nominal * backup <= 0.0:
         return 0.0
-    return wanted if abs(wanted) < abs(backup) else backup
+    return nominal if abs(nominal) < abs(backup) else backup
 
 
 @lean_kernel

@@ -7,7 +7,7 @@ problems.
 
 from __future__ import annotations
 
-from ..backup.rank import ALL
+from ..backup.score import ALL
 from ..jit import lean_kernel
 from ..workspace import Scene
 

@@ -86,25 +86,25 @@ def set_required_margins(scene: Scene) -> None:
 
 
 @lean_kernel
-def screen(scene: Scene) -> bool:
+def check_nominal(scene: Scene) -> bool:
     """Check the nominal commands; return True when every boat still has its backup after them.
 
     A command that is not usable (NaN, infinite, beyond `LARGEST_COMMAND`) becomes: hold course at zero speed. So does
     the command of a boat for whose position a registered barrier reports nothing.
     """
     state, ours = scene.state, scene.ours
-    n, wanted = state.shape[0], scene.nominal
+    n, nominal = state.shape[0], scene.nominal
     find_neighbours(scene)
     set_required_margins(scene)
     for i in range(n):
-        copy_row(scene.command[i], wanted[i])
+        copy_row(scene.command[i], nominal[i])
         scene.slack_m[i] = 0.0
         scene.moving[i] = False
         scene.solver[i] = 0
         scene.reason[i] = W.PASSED if ours[i] else W.NOT_COVERED
         if not ours[i]:
             continue
-        usable = abs(wanted[i, 0]) <= W.LARGEST_COMMAND and abs(wanted[i, 1]) <= W.LARGEST_COMMAND
+        usable = abs(nominal[i, 0]) <= W.LARGEST_COMMAND and abs(nominal[i, 1]) <= W.LARGEST_COMMAND
         if not usable or unknown_at(i, scene) >= 0:
             scene.command[i, 0], scene.command[i, 1] = 0.0, 0.0
             scene.reason[i] = W.HELD

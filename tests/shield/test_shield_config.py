@@ -6,7 +6,7 @@ from dataclasses import FrozenInstanceError, fields
 import numpy as np
 import pytest
 from steerclear.shield import Shield, ShieldConfig
-from steerclear.shield.backup.family import CERTIFICATES
+from steerclear.shield.backup.family import OPPONENT_MODELS
 from steerclear.shield.config import COORDINATION, PROFILES
 from steerclear.shield.exceptions import ConfigError, SolverError, SteerclearError
 
@@ -71,7 +71,7 @@ def test_names_must_be_texts(name, value):
 
 
 @pytest.mark.parametrize(
-    ("name", "known"), [("opponent_model", CERTIFICATES), ("coordination", COORDINATION), ("profile", PROFILES)]
+    ("name", "known"), [("opponent_model", OPPONENT_MODELS), ("coordination", COORDINATION), ("profile", PROFILES)]
 )
 def test_unknown_names_are_told_the_known_ones(name, known):
     with pytest.raises(ConfigError, match=f"unknown {name} 'magic'; choose one of {', '.join(known)}"):

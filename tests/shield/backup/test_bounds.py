@@ -7,8 +7,8 @@ from stages import screened, stages_of
 from steerclear.shield import ShieldConfig, Surroundings
 from steerclear.shield.backup.family import FAMILY, candidate
 from steerclear.shield.backup.paths import READY_SAMPLE
-from steerclear.shield.backup.rank import ALL, OPPONENTS, WORST, Rank, better, is_no_better, score_path
 from steerclear.shield.backup.rollout import lay_placed, place_manoeuvre, roll_out
+from steerclear.shield.backup.score import ALL, OPPONENTS, WORST, Score, better, is_no_better, score_path
 from steerclear.shield.barriers import pursuit
 from steerclear.shield.barriers.clearance import FAR
 from steerclear.shield.barriers.neighbours import find_neighbours
@@ -32,13 +32,13 @@ def scenes(platform, count, side_m):
 
 
 def ranked(at, number, best):
-    """Rank of manoeuvre ``number`` of boat 0 from its present state; None where it is not rolled out."""
+    """Score of manoeuvre ``number`` of boat 0 from its present state; None where it is not rolled out."""
     trial = len(at.state)
     place_manoeuvre(0, trial, candidate(0, number, 1.0, at.state[0, L.HEADING], at.scene), 0, at.scene)
     if is_no_better(0, trial, best, at.scene):
         return None
     lay_placed(0, trial, 0, at.scene)
-    return Rank(*score_path(0, trial, best, at.scene))
+    return Score(*score_path(0, trial, best, at.scene))
 
 
 @pytest.mark.parametrize(("platform", "side_m"), [("heron", 40.0), ("surveyor", 70.0)])
@@ -47,7 +47,7 @@ def test_only_what_is_no_better_is_cut_short(platform, side_m):
     for at in scenes(platform, 25, side_m):
         numbers = range(FAMILY, FAMILY + int(at.boats.n_manoeuvres[0]))
         full = [ranked(at, number, WORST) for number in numbers]
-        for best in {*full[::4], Rank(ALL, 0.5), Rank(OPPONENTS, -1.0)}:
+        for best in {*full[::4], Score(ALL, 0.5), Score(OPPONENTS, -1.0)}:
             for number, whole in zip(numbers, full, strict=True):
                 rank = ranked(at, number, best)
                 if better(whole, best):

@@ -25,7 +25,7 @@ SAME_M = 1e-6
 """Scores that differ by no more, m, are equal, so that rounding, which varies with the place, decides nothing."""
 
 
-class Rank(NamedTuple):
+class Score(NamedTuple):
     """Score of a manoeuvre; more is better, entry by entry.
 
     Attributes:
@@ -39,26 +39,26 @@ class Rank(NamedTuple):
     score_m: float
 
 
-WORST = Rank(NOTHING, -1e9)
+WORST = Score(NOTHING, -1e9)
 """A score that every manoeuvre reaches."""
 
 
 @lean_kernel
-def better(rank: Rank, best: Rank) -> bool:
+def better(score: Score, best: Score) -> bool:
     """Return whether a score exceeds another by more than rounding."""
-    return rank.satisfied > best.satisfied or (
-        rank.satisfied == best.satisfied and rank.score_m > best.score_m + SAME_M
+    return score.satisfied > best.satisfied or (
+        score.satisfied == best.satisfied and score.score_m > best.score_m + SAME_M
     )
 
 
 @lean_kernel
-def score_of(i: int, scene: Scene) -> Rank:
+def score_of(i: int, scene: Scene) -> Score:
     """Return the score of boat i's present manoeuvre."""
-    return Rank(scene.satisfied[i], scene.score_m[i])
+    return Score(scene.satisfied[i], scene.score_m[i])
 
 
 @lean_kernel
-def level_to_beat(best: Rank) -> float:
+def level_to_beat(best: Score) -> float:
     """Return the margin against pursuers, m, at which a manoeuvre that violates it is no better than the best."""
     if best.satisfied > OBSTACLES:
         return FAR
@@ -66,13 +66,13 @@ def level_to_beat(best: Rank) -> float:
 
 
 @lean_kernel
-def least_to_beat(best: Rank) -> float:
+def least_to_beat(best: Score) -> float:
     """Return the margin, m, below which a manoeuvre is no better than the best, whatever else it satisfies."""
     return best.score_m + SAME_M if best.satisfied == ALL else -FAR
 
 
 @lean_kernel
-def is_no_better(i: int, slot: int, best: Rank, scene: Scene) -> bool:
+def is_no_better(i: int, slot: int, best: Score, scene: Scene) -> bool:
     """Return whether any path of a manoeuvre in ``slot`` scores no better than the best, by value tables alone."""
     least_m = least_to_beat(best)
     return scene.tuning.margin_cap_m < least_m or falls_short_at_once(i, slot, level_to_beat(best), least_m, scene)
@@ -87,7 +87,7 @@ def _skip_pursuers(slot: int, scene: Scene) -> None:
 
 
 @lean_kernel
-def _rank_if_clear(i: int, slot: int, scene: Scene) -> Rank:
+def _score_if_clear(i: int, slot: int, scene: Scene) -> Score:
     """Return the score of a path that satisfies all margins from boats, by static and boats' margins in ``slot``."""
     if not scene.static_known[slot]:
         scene.static_known[slot], scene.static_by[slot] = (
@@ -96,11 +96,11 @@ def _rank_if_clear(i: int, slot: int, scene: Scene) -> Rank:
         )
     to_spare_m = scene.static_clear[slot, MARGIN] - scene.static_target_m[i]
     spare_m = min(scene.clear[slot, MARGIN], scene.tuning.margin_cap_m)
-    return Rank(ALL, spare_m) if to_spare_m >= 0.0 else Rank(OPPONENTS, to_spare_m + SPARE_SCORE * spare_m)
+    return Score(ALL, spare_m) if to_spare_m >= 0.0 else Score(OPPONENTS, to_spare_m + SPARE_SCORE * spare_m)
 
 
 @lean_kernel
-def score_path(i: int, slot: int, best: Rank, scene: Scene) -> Rank:
+def score_path(i: int, slot: int, best: Score, scene: Scene) -> Score:
     """Score the path in ``slot`` for boat i; stop early once it cannot exceed ``best``.
 
     Certain constraints come before adversarial ones: first teammates and opponents that hold their course, then
@@ -113,32 +113,32 @@ def score_path(i: int, slot: int, best: Rank, scene: Scene) -> Rank:
     worst_clearance(i, slot, scene, best.score_m if best.satisfied == NOTHING else max(0.0, least_m))
     if not clear[MARGIN] >= 0.0:
         _skip_pursuers(slot, scene)
-        return Rank(NOTHING, clear[MARGIN])
+        return Score(NOTHING, clear[MARGIN])
     touched = clear_of_near_obstacles(i, slot, scene, 0.0, scene.spare2)
     if not scene.spare2[MARGIN] >= 0.0:
-        rank = Rank(BOATS, scene.spare2[MARGIN] + LATER_SCORE_M * scene.spare2[SAMPLE])
-        if better(rank, best):
+        score = Score(BOATS, scene.spare2[MARGIN] + LATER_SCORE_M * scene.spare2[SAMPLE])
+        if better(score, best):
             worst_pursuer(i, slot, -FAR, -FAR, scene)
         else:
             _skip_pursuers(slot, scene)
         scene.refused_by_table[slot], scene.bound[slot] = False, touched
-        return rank
+        return score
     sure_m, short = clear[MARGIN], scene.violates_known[slot]
-    if short and not better(Rank(OBSTACLES, sure_m), best):
+    if short and not better(Score(OBSTACLES, sure_m), best):
         _skip_pursuers(slot, scene)
-        return Rank(OBSTACLES, sure_m)
+        return Score(OBSTACLES, sure_m)
     if best.satisfied > OBSTACLES:  # what static constraints say is found sooner than what pursuers may do
-        rank = _rank_if_clear(i, slot, scene)
-        if not better(rank, best):
+        score = _score_if_clear(i, slot, scene)
+        if not better(score, best):
             _skip_pursuers(slot, scene)
-            return rank
+            return score
     worst_pursuer(i, slot, level_to_beat(best), least_m, scene)
     if short or scene.violates_pursuers[slot]:
-        return Rank(OBSTACLES, min(sure_m, scene.threat_m[slot]) if short else scene.threat_m[slot])
-    rank = _rank_if_clear(i, slot, scene)
-    if rank.satisfied < ALL:
+        return Score(OBSTACLES, min(sure_m, scene.threat_m[slot]) if short else scene.threat_m[slot])
+    score = _score_if_clear(i, slot, scene)
+    if score.satisfied < ALL:
         scene.bound[slot] = scene.static_by[slot]
-    return rank
+    return score
 
 
 @lean_kernel
