@@ -99,6 +99,10 @@ class FakeLink:
         }
         return BoatReading(boat=self.boat, read_s=now, **{**values, **self.changed})
 
+    def fall_silent(self):
+        """Say nothing new from now on."""
+        self.silent_since_s = self.clock.now_s() if self.silent_since_s is None else self.silent_since_s
+
     def _at(self, time_s):
         """The latest moment kept that is not after that time."""
         if self.silent_since_s is None or self._silent is None:
@@ -287,6 +291,11 @@ class World:
     def responses(self, subject=None):
         """(condition, response) of the last tick's actions."""
         return {(a.condition, a.response) for a in self.last.actions if subject in (None, a.subject)}
+
+
+def since(time_s, act):
+    """Calls ``act(world)`` before every turn from that time on."""
+    return lambda world: act(world) if world.clock.now_s() >= time_s - 1e-6 else None
 
 
 def straight(heading_deg, speed=2.0):

@@ -4,21 +4,22 @@ import math
 
 import numpy as np
 from bridge_fakes import FakeContacts, World, fleet_of
-from feed_attack import CLOCK
 from steerclear.shield.bridge.feed import FeedReceiver, Packet
 from steerclear.shield.bridge.feed_packets import Fix, Seal
 from steerclear.shield.bridge.frame import FieldFrame
+from steerclear.shield.bridge.mavlink.signing import SigningClock
 from steerclear.shield.platforms import layout as L
 
 FRAME = FieldFrame(42.0, -71.0)
 KEY = bytes(range(32))
+CLOCK = SigningClock()
 SEPARATION_M = 2.5
 PER_TURN = 20
 """Packets of the attacker in a turn of 0.1 s."""
 
 
 class Deaf(FeedReceiver):
-    """Packets are handed to it."""
+    """A receiver that hears nothing by itself: packets are handed to it."""
 
     def _hear(self):
         pass
@@ -59,8 +60,8 @@ class FedContacts(FakeContacts):
 
     @staticmethod
     def _fix(name, row):
-        latitude, longitude = FRAME.to_geodetic_deg(float(row[L.X]), float(row[L.Y]))
-        return Fix(name, latitude, longitude, float(row[L.HEADING]), float(row[L.SPEED]), 0.0, 0.1)
+        place = FRAME.to_geodetic_deg(float(row[L.X]), float(row[L.Y]))
+        return Fix(name, *place, float(row[L.HEADING]), float(row[L.SPEED]), 0.0, 0.1)
 
 
 class Courses:

@@ -1,6 +1,8 @@
-"""Every limit of the file, just kept and just broken, and what is declared for it."""
+"""Every limit of the file, just kept and just broken, and what is declared for it; what the operator may switch off."""
 
+import logging
 import math
+import threading
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,8 +13,9 @@ from steerclear.shield import Commands
 from steerclear.shield.bridge.failsafe import Failsafe, Seen, words
 from steerclear.shield.bridge.failsafe_table import CONDITIONS, DISABLES, response_page, response_table
 from steerclear.shield.bridge.messages import Answer, BoatReading
-from steerclear.shield.bridge.operator import Override
+from steerclear.shield.bridge.operator import LONGEST_OVERRIDE_S, Operator, Override
 from steerclear.shield.bridge.tracker import Track, Tracker
+from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import fresh_state
 
 MORE = """
@@ -45,12 +48,6 @@ def verdict_of(navigation_s=0.0, contact_s=0.0, known_s=None, where=(0.0, 0.0), 
         failsafe.judge(Seen(100.0, boats, Answer(good, age_s)))
     answer = Answer(good if usable else bad, 0.0 if age_s is None else age_s, seen.pop("policy_fault", ""))
     return failsafe.judge(Seen(100.0, boats, answer, **seen))
-
-
-def test_nothing_is_due_while_all_is_well():
-    verdict = verdict_of()
-    assert (verdict.actions, verdict.responses) == ([], {})
-    assert not verdict.unknown | verdict.idle | verdict.dropped
 
 
 @pytest.mark.parametrize(
@@ -87,6 +84,7 @@ def test_each_limit_has_its_declared_response(situation, response, said):
 @pytest.mark.parametrize(
     "situation",
     [
+        {},
         {"navigation_s": 0.5},
         {"contact_s": 1.0},
         {"policy_age_s": 0.5},
@@ -98,7 +96,9 @@ def test_each_limit_has_its_declared_response(situation, response, said):
     ],
 )
 def test_within_a_limit_nothing_is_due(situation):
-    assert verdict_of(**situation).responses == {}
+    verdict = verdict_of(**situation)
+    assert (verdict.actions, verdict.responses) == ([], {})
+    assert not verdict.unknown | verdict.idle | verdict.dropped
 
 
 def test_the_strongest_of_several_counts_and_all_are_told():
@@ -107,22 +107,15 @@ def test_the_strongest_of_several_counts_and_all_are_told():
     assert len(verdict.actions) == 4
 
 
-def test_a_boat_that_is_unknown_or_obeys_somebody_else_is_named():
-    assert verdict_of(navigation_s=3.0).unknown == {"blue_1"}
-    verdict = verdict_of(reading={"ready": False, "why_not": "in MANUAL"})
-    assert verdict.idle == {"blue_1"}
-    assert "in MANUAL" in verdict.actions[0].text
-    assert verdict.responses == {}
-
-
-@pytest.mark.parametrize("silent_s", [0.0, 2.0, 30.0])
-def test_a_boat_somebody_took_is_told_nothing_however_long_it_is_silent(silent_s):
-    taken = {"ready": False, "released": True, "why_not": "taken from us", "heartbeat_age_s": silent_s}
+@pytest.mark.parametrize(("released", "silent_s"), [(False, 0.0), (True, 0.0), (True, 2.0), (True, 30.0)])
+def test_a_boat_that_obeys_somebody_else_is_told_nothing_and_one_that_was_taken_however_long_it_is_silent(
+    released, silent_s
+):
+    taken = {"ready": False, "released": released, "why_not": "in MANUAL", "heartbeat_age_s": silent_s}
     verdict = verdict_of(navigation_s=silent_s, reading=taken)
-    assert verdict.idle == {"blue_1"}
-    assert verdict.unknown == set()
-    assert verdict.responses == {}
-    assert "taken from us" in verdict.actions[0].text
+    assert (verdict.idle, verdict.unknown, verdict.responses) == ({"blue_1"}, set(), {})
+    assert "in MANUAL" in verdict.actions[0].text
+    assert verdict_of(navigation_s=3.0).unknown == {"blue_1"}
 
 
 @pytest.mark.parametrize(
@@ -142,12 +135,9 @@ def test_an_override_switches_off_its_own_response_only(situation, condition):
     assert verdict_of(**situation, overrides=(other,)).responses != {}
 
 
-def test_no_override_lets_a_boat_go_on_without_a_command():
+def test_no_override_lets_a_boat_go_on_without_a_command_and_one_of_a_lost_contact_drops_it():
     made = Override("policy", "blue_1", 1.0, "test")
     assert verdict_of(usable=False, overrides=(made,)).responses == {"blue_1": "stop"}
-
-
-def test_an_override_of_a_lost_contact_drops_it_and_of_an_old_one_does_not():
     made = Override("contact", "red_1", 1.0, "test")
     assert verdict_of(contact_s=9.0, overrides=(made,)).dropped == {"red_1"}
     assert verdict_of(contact_s=2.0, overrides=(made,)).dropped == set()
@@ -160,7 +150,6 @@ def test_an_override_of_a_lost_contact_drops_it_and_of_an_old_one_does_not():
         (Answer(Commands(np.zeros((2, 2)), relative=True), 0.0), "relative to headings"),
         (Answer(Commands.absolute_rad(np.zeros((3, 2))), 0.0), "3 boats of 2"),
         (Answer(Commands.absolute_rad(np.full((2, 2), 1e9)), 0.0), "no command for blue_1"),
-        (Answer(Commands.absolute_rad(np.zeros((2, 2))), -1.0), "no answer of the policy yet"),
         (Answer(Commands.absolute_rad(np.zeros((2, 2))), math.nan), "no answer of the policy yet"),
     ],
 )
@@ -220,3 +209,57 @@ def test_the_page_shows_the_table_that_the_loop_acts_by():
 
 def test_ages_in_words():
     assert [words(age) for age in (0.25, 120.4, math.inf)] == ["0.2 s old", "120 s old", "never heard"]
+
+
+def test_stop_all_is_in_force_until_taken_back(caplog):
+    operator = Operator()
+    with caplog.at_level(logging.WARNING):
+        operator.stop_all("key")
+        assert (operator.stopped, operator.hard) == ("key", False)
+        operator.stop_all("key")
+        assert operator.hard
+        assert [action.condition for action in operator.actions(0.0)] == ["stop_all"]
+        operator.resume()
+    assert (operator.stopped, operator.hard, operator.actions(0.0)) == ("", False, ())
+    assert "past the shield" in caplog.text
+
+
+def test_an_override_says_what_it_disables_and_ends(caplog):
+    operator = Operator()
+    with caplog.at_level(logging.WARNING):
+        operator.override("contact", "red_1", 30.0, now_s=100.0, by="key")
+        (action,) = operator.actions(110.0)
+        assert "20 s more" in action.text
+        assert DISABLES["contact"] in action.text
+        assert operator.active(129.9)
+        assert operator.active(130.0) == ()
+    assert "disables" in caplog.text
+    assert "ended" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("condition", "seconds", "words"),
+    [
+        *(("game", seconds, "at most") for seconds in (0.0, -1.0, LONGEST_OVERRIDE_S + 1.0, math.nan, math.inf)),
+        *((condition, 10.0, "cannot be overridden") for condition in ("shield", "navigation", "link", "")),
+    ],
+)
+def test_no_override_without_an_end_nor_of_the_shield_or_own_navigation(condition, seconds, words):
+    with pytest.raises(ConfigError, match=words):
+        Operator().override(condition, "", seconds, 0.0)
+
+
+def test_many_threads_at_once():
+    operator = Operator()
+
+    def work(k):
+        for i in range(200):
+            operator.override("contact", f"boat_{k}", 1.0 + i, 0.0)
+            operator.active(0.5)
+
+    threads = [threading.Thread(target=work, args=(k,)) for k in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(operator.active(0.5)) == 4

@@ -9,7 +9,7 @@ import math
 import drill_times
 import numpy as np
 import pytest
-from bridge_fakes import pair
+from bridge_fakes import pair, since
 
 VERSION = "now"  # of `drill_times`: this tree
 STRUCK_S, AFTER_S = 1004.0, 20.0
@@ -32,8 +32,7 @@ def policy_says(value):
 
 
 def telemetry_stops(world):
-    link = world.links["blue_1"]
-    link.silent_since_s = world.clock.now_s() if link.silent_since_s is None else link.silent_since_s
+    world.links["blue_1"].fall_silent()
 
 
 def frozen(world):
@@ -110,7 +109,7 @@ def driven(strike, settings):
         take(tick)
 
     world.sink.take = note
-    world.run(STRUCK_S - 1000.0 + AFTER_S, lambda world: world.clock.now_s() >= STRUCK_S - 1e-6 and strike(world))
+    world.run(STRUCK_S - 1000.0 + AFTER_S, since(STRUCK_S, strike))
     return seen, world
 
 

@@ -1,18 +1,24 @@
-"""The position and game feed: what is taken, what is refused, whose word counts."""
+"""The position and game feed: what is taken, what is refused, whose word counts, and that a key keeps others out."""
 
-import contextlib
+import hmac
 import json
 import math
-import random
 import socket
 import threading
 import time
+from pathlib import Path
 
 import pytest
+from bridge_fakes import game_of
+from fed_world import CLOCK, Deaf
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from steerclear.shield.bridge.clock import ManualClock, MonotonicClock
 from steerclear.shield.bridge.feed import (
+    GONE_S,
+    MAX_SENDERS,
+    MOST_AHEAD,
+    REFEREE_GONE_S,
     BoatStatus,
     FeedReceiver,
     FeedSender,
@@ -23,12 +29,15 @@ from steerclear.shield.bridge.feed import (
     game_state,
     parse_packet,
 )
-from steerclear.shield.bridge.feed_packets import MAX_BYTES
+from steerclear.shield.bridge.feed_packets import MAX_BYTES, SEAL_BYTES, Seal, is_sealed
 from steerclear.shield.bridge.frame import FieldFrame
+from steerclear.shield.bridge.mavlink.signing import TICKS_PER_S
 from steerclear.shield.exceptions import BridgeError, ConfigError, FeedError
 
 FRAME = FieldFrame(42.0, -71.0, 30.0)
 LOCAL = "127.0.0.1"
+KEY, OTHER = bytes(range(32)), bytes(32)
+TRUE = Fix("red_1", 42.0001, -71.0001, 90.0, 1.0, 0.0, 0.1)
 STATUS = BoatStatus(tagged=True, has_flag=False, oob=False, on_side=True, cooldown_s=7.25, driven=True)
 GAME = GameState(
     time_s=12.5,
@@ -57,16 +66,21 @@ def game(**changes):
 
 @pytest.fixture
 def receiver():
-    with FeedReceiver("127.0.0.1:0", FRAME, ManualClock(100.0), boats=("blue_1", "red_1")) as opened:
+    with Deaf("127.0.0.1:0", FRAME, ManualClock(100.0), boats=("blue_1", "red_1")) as opened:
+        yield opened
+
+
+@pytest.fixture
+def keyed():
+    with Deaf("127.0.0.1:0", FRAME, ManualClock(100.0), boats=("red_1",), key=KEY) as opened:
         yield opened
 
 
 def test_a_fix_becomes_a_contact_in_the_field(receiver):
-    x_m, y_m = 12.0, 34.0
-    latitude, longitude = FRAME.to_geodetic_deg(x_m, y_m)
+    latitude, longitude = FRAME.to_geodetic_deg(12.0, 34.0)
     receiver.take(positions(contact(latitude_deg=latitude, longitude_deg=longitude)), LOCAL)
     (found,) = receiver.read()
-    assert found.position_m == pytest.approx((x_m, y_m), abs=1e-6)
+    assert found.position_m == pytest.approx((12.0, 34.0), abs=1e-6)
     assert found.heading_rad == pytest.approx(math.radians(45.0))
     assert (found.boat, found.source, found.speed_mps, found.error_m) == ("red_1", "hub", 1.5, 0.5)
     assert found.fixed_s == 99.75
@@ -86,7 +100,6 @@ def test_the_state_of_the_game_comes_through_exactly(receiver):
         b"",
         b"{",
         b"[]",
-        b"null",
         b"\xff\xfe\x00",
         b"[" * 20000,
         b'{"steerclear": true, "kind": "positions", "sender": "hub", "seq": 1, "contacts": []}',
@@ -107,7 +120,6 @@ def test_the_state_of_the_game_comes_through_exactly(receiver):
         game(time_s=math.nan),
         game(time_s=-1.0),
         game(time_s="12"),
-        game(boats=[]),
         game(boats={"blue_1": {**vars(STATUS), "tagged": 1}}),
         game(boats={"blue_1": {**vars(STATUS), "cooldown_s": math.inf}}),
         game(boats={"blue_1": None}),
@@ -126,34 +138,29 @@ def test_malformed_packets_are_refused_whole(receiver, data):
         parse_packet(data)
     receiver.take(data, LOCAL)
     assert receiver.faults() == {"malformed": 1}
-    assert receiver.read() == ()
-    assert receiver.game() is None
+    assert (receiver.read(), receiver.game()) == ((), None)
 
 
 BAD_FIXES = [
     {"latitude_deg": math.nan},
     {"latitude_deg": 89.5},
+    {"latitude_deg": 43.0},
     {"longitude_deg": 181.0},
     {"heading_deg": math.inf},
     {"heading_deg": "75"},
     {"heading_deg": 721.0},
+    {"heading_deg": -400.0},
+    *({"heading_deg": value} for value in (360, 360.0, -360, 511, 655.35, 65535, 3600, 36000)),
     {"speed_mps": 51.0},
+    {"speed_mps": 102.3},
     {"speed_mps": True},
     {"age_s": -0.1},
-    {"age_s": 1e6},
+    {"age_s": 65535},
     {"error_m": -1.0},
+    {"error_m": 655.35},
     {"error_m": None},
     {"boat": 7},
     {"boat": ""},
-    {"latitude_deg": 43.0},
-    {"heading_deg": -400.0},
-    {"latitude_deg": 91.0},
-    {"longitude_deg": 181.0},
-    {"speed_mps": 102.3},
-    {"speed_mps": 655.35},
-    {"error_m": 655.35},
-    {"age_s": 65535},
-    *({"heading_deg": value} for value in (360, 360.0, -360, 511, 511.0, 655.35, 65535, 3600, 36000)),
 ]
 
 
@@ -177,13 +184,9 @@ def test_a_full_turn_of_our_own_is_sent_as_north(receiver, heading):
     assert parse_packet(data).fixes[0].heading_deg == 0.0
 
 
-@pytest.mark.parametrize(
-    "key", ["boat", "latitude_deg", "longitude_deg", "heading_deg", "speed_mps", "age_s", "error_m"]
-)
+@pytest.mark.parametrize("key", list(contact()))
 def test_nothing_is_assumed_for_what_a_fix_lacks(receiver, key):
-    entry = contact()
-    del entry[key]
-    receiver.take(positions(entry), LOCAL)
+    receiver.take(positions({name: value for name, value in contact().items() if name != key}), LOCAL)
     assert receiver.read() == ()
     assert key in receiver.fault_texts()["fix"]
 
@@ -197,15 +200,14 @@ def test_strangers_are_not_boats_of_the_fleet(receiver):
 
 
 def test_packets_from_hosts_not_allowed_are_not_even_read():
-    with FeedReceiver("127.0.0.1:0", FRAME, ManualClock(), allow=["10.1.0.0/16", "::1"]) as receiver:
+    with Deaf("127.0.0.1:0", FRAME, ManualClock(), allow=["10.1.0.0/16", "::1"]) as receiver:
         for host in (LOCAL, "10.2.0.1", "fe80::1%eth0", "nonsense"):
             receiver.take(positions(contact()), host)
         assert receiver.faults() == {"foreign": 4}
         assert receiver.read() == ()
-        receiver.take(positions(contact()), "10.1.200.3")
-        receiver.take(positions(contact(), seq=2), "::1")
-        receiver.take(positions(contact(speed_mps=0.25), seq=3), "::ffff:10.1.0.9")
-        assert [found.speed_mps for found in receiver.read()] == [0.25]
+        for seq, host in enumerate(("10.1.200.3", "::1", "::ffff:10.1.0.9")):
+            receiver.take(positions(contact(speed_mps=0.25 * seq), seq=seq), host)
+        assert [found.speed_mps for found in receiver.read()] == [0.5]
         assert receiver.faults() == {"foreign": 4}
 
 
@@ -222,32 +224,23 @@ def test_of_two_senders_neither_counts_for_being_fresher(receiver):
 def test_who_is_refused_takes_no_referees_seat(receiver, wrong):
     receiver.take(game(**wrong), LOCAL)
     receiver.take(game(), LOCAL)
-    assert receiver.game() == GAME
-    assert receiver.alarms() == ()
     receiver.take(game(**wrong, seq=2), LOCAL)
+    assert receiver.game() == GAME
     assert receiver.alarms() == ()
 
 
 def test_senders_and_boats_without_end_do_not_fill_the_memory():
-    with FeedReceiver("127.0.0.1:0", FRAME, ManualClock()) as receiver:
+    with Deaf("127.0.0.1:0", FRAME, ManualClock()) as receiver:
         for k in range(200):
             receiver.take(positions(contact(boat=f"boat_{k}"), sender=f"hub_{k}"), LOCAL)
         for k in range(400):
             receiver.take(positions(*(contact(boat=f"b{k}_{j}") for j in range(8)), sender="hub_0", seq=k + 2), LOCAL)
         assert len(receiver.read()) == 256
-        assert len(receiver._senders) == 64
+        assert len(receiver._senders) == MAX_SENDERS
         assert "hub_0" in receiver._senders, "who was there first stays"
         for k in range(400):
             receiver.take(positions(contact(boat="boat_0"), sender=f"liar_{k}"), LOCAL)
         assert len(receiver.read()) <= 256 + 8
-
-
-@settings(derandomize=True, deadline=None, max_examples=300)
-@given(st.binary(max_size=200))
-@example(b'{"steerclear":1,"kind":"game","sender":"r","seq":1,"boats":{},"flags":[{},{}]}')
-def test_no_bytes_raise_anything_else(data):
-    with contextlib.suppress(FeedError):
-        assert parse_packet(data).sender
 
 
 JSON = st.recursive(
@@ -256,11 +249,15 @@ JSON = st.recursive(
     max_leaves=5,
 )
 KEYS = st.sampled_from([*contact(), *GAME.as_dict(), *vars(STATUS), "contacts", "kind", "sender", "seq", "run", "x_m"])
+QUIET = Deaf("127.0.0.1:0", FRAME, ManualClock(100.0))
+QUIET.close()
+HALF_A_GAME = b'{"steerclear":1,"kind":"game","sender":"r","seq":1,"boats":{},"flags":[{},{}]}'
 
 
 @settings(derandomize=True, deadline=None, max_examples=300)
-@given(st.booleans(), KEYS, JSON, st.integers(0, 400), st.integers(0, 255))
-def test_mutated_packets_never_crash_nor_leave_what_is_not_finite(is_game, key, value, at, byte):
+@given(st.booleans(), KEYS, JSON, st.integers(0, 400), st.integers(0, 255), st.binary(max_size=200))
+@example(True, "time_s", 1.0, 0, 0, HALF_A_GAME)
+def test_mutated_packets_never_crash_nor_leave_what_is_not_finite(is_game, key, value, at, byte, junk):
     content = json.loads(game() if is_game else positions(contact(), contact(boat="blue_1")))
     for place in (content, *content.get("contacts", ()), *content.get("boats", {}).values(), *content.get("flags", ())):
         if key in place:
@@ -268,26 +265,193 @@ def test_mutated_packets_never_crash_nor_leave_what_is_not_finite(is_game, key, 
     whole = json.dumps(content).encode()
     flipped = bytearray(whole)
     flipped[at % len(flipped)] ^= byte
-    receiver = QUIET
-    receiver._senders.clear()
-    for data in (whole, bytes(flipped)):
-        receiver.take(data, LOCAL)
-    for found in receiver.read():
+    QUIET._senders.clear()
+    for data in (whole, bytes(flipped), junk):
+        QUIET.take(data, LOCAL)
+    for found in QUIET.read():
         assert all(map(math.isfinite, (*found.position_m, found.heading_rad, found.speed_mps, found.fixed_s)))
         assert found.fixed_s <= 100.0
-    state = receiver.game()
+    state = QUIET.game()
     assert state is None or math.isfinite(state.time_s)
 
 
-class Deaf(FeedReceiver):
-    """A receiver without a socket: packets are handed to it."""
+def problem(receiver, now_s, seq, run=7, sender="hub", game=None, stamp=None):
+    """Kind and text of what is refused of a packet; None: it is taken."""
+    receiver._clock.sleep_until(now_s)
+    before = receiver.faults()
+    data = Packet(sender, run, seq, game=game, stamp=stamp).encode()
+    receiver.take(data if receiver._seal is None else receiver._seal.close(data), LOCAL)
+    new = (kind for kind, count in receiver.faults().items() if kind != "late" and count > before.get(kind, 0))
+    return next(((kind, receiver.fault_texts()[kind]) for kind in new), None)
 
-    def _hear(self):
-        pass
+
+@pytest.fixture
+def order():
+    with Deaf("127.0.0.1:0", FRAME, ManualClock()) as opened:
+        yield opened
 
 
-QUIET = Deaf("127.0.0.1:0", FRAME, ManualClock(100.0))
-QUIET.close()
+def told(order, seconds, now_s=0.0, first=1):
+    """Lets a sender speak for so long at 20 Hz; how many of its packets were refused, of how many."""
+    count = round(seconds * 20.0)
+    return sum(problem(order, now_s + k / 20.0, first + k) is not None for k in range(count)), count
+
+
+@pytest.mark.parametrize(
+    "intruder", [{"run": 8, "seq": 0}, {"run": 8, "seq": 2**62}, {"seq": 2**62}, {"seq": 21 + MOST_AHEAD}, {"seq": 0}]
+)
+def test_one_packet_in_a_senders_name_costs_it_none_of_its_own(order, intruder):
+    assert told(order, 1.0) == (0, 20)
+    kind, text = problem(order, 1.0, **intruder)
+    assert kind in ("second run", "old")
+    assert "hub" in text
+    assert told(order, 12.0, 1.05, first=21) == (0, 240), "234 of 240 were refused before"
+
+
+def test_a_count_moved_within_bounds_costs_a_sender_seconds_and_not_the_rest_of_the_day(order):
+    told(order, 1.0)
+    assert problem(order, 1.0, 20 + MOST_AHEAD) is None
+    assert told(order, 12.0, 1.05, first=21)[0] <= GONE_S * 20.0
+    assert told(order, 1.0, 14.0, first=261) == (0, 20)
+
+
+def test_an_intruder_that_speaks_on_never_gets_in_beside_the_one_that_was_there(order):
+    counts = {7: 0, 8: 0}
+    for k in range(2400):  # 12 s: the true one at 20 Hz, the other at 200 Hz
+        counts[8] += k > 0 and problem(order, k / 200.0, k, run=8) is None
+        if k % 10 == 0:
+            counts[7] += problem(order, k / 200.0, k // 10, run=7) is None
+    assert counts == {7: 240, 8: 0}
+
+
+def test_a_new_start_counts_after_the_old_ones_silence_and_so_does_the_old_one_again(order):
+    told(order, 1.0)
+    assert problem(order, 1.0 + 0.5 * GONE_S, 0, run=8)[0] == "second run"
+    assert problem(order, 1.0 + GONE_S, 1, run=8) is None
+    assert problem(order, 1.5 + GONE_S, 21, run=7)[0] == "second run", "a late one of the old start"
+    assert problem(order, 1.0 + 2.0 * GONE_S, 22, run=7) is None, "it held its place while it spoke, no longer"
+
+
+def test_small_disorder_is_old_and_no_sign_of_a_second_program(order):
+    told(order, 1.0)
+    assert problem(order, 1.0, 20)[0] == "repeated"
+    assert problem(order, 1.0, 18)[0] == "old"
+    problem(order, 1.0, 900)
+    assert problem(order, 1.1, 20)[0] == "second run", "somebody counts far behind"
+
+
+@pytest.mark.parametrize("junk", [64, 1000])
+def test_junk_names_keep_nobody_out_and_push_out_nobody_who_was_there(order, junk):
+    counts = {"hub": 0, "late": 0}
+    for k in range(4000):  # 20 s of junk at 200 Hz, each name speaking again before it is silent for long
+        problem(order, k / 200.0, k, sender=f"junk_{k % junk}")
+        if k % 10 == 5:
+            counts["hub"] += problem(order, k / 200.0, k, sender="hub") is None
+            counts["late"] += k > 2000 and problem(order, k / 200.0, k, sender="late") is None
+    assert counts == {"hub": 400, "late": 200}
+    assert len(order._senders) <= MAX_SENDERS
+
+
+def test_a_game_is_kept_by_one_referee_and_taken_over_only_after_its_silence(order):
+    def said(now_s, seq, sender, run=7):
+        return (problem(order, now_s, seq, run, sender, game_of()) or ("",))[0]
+
+    assert said(0.0, 1, "referee") == ""
+    assert said(0.1, 0, "referee", run=99) == "second run"
+    assert said(0.1, 1, "other") == "second referee"
+    assert said(0.2, 2, "referee") == ""
+    assert said(0.2 + REFEREE_GONE_S, 2, "other") == ""
+
+
+def test_sealed_packets_must_be_of_our_time_and_rise(keyed):
+    now = CLOCK.now()
+    assert problem(keyed, 0.0, 1)[0] == "malformed"
+    for off_s in (-61.0, 61.0, 1e9, -1e8):
+        assert problem(keyed, 0.0, 1, stamp=int(now + off_s * TICKS_PER_S))[0] == "old_signature"
+    assert problem(keyed, 100.0, 1, stamp=now) is None
+    assert problem(keyed, 100.1, 2, stamp=now)[0] == "replayed"
+    assert problem(keyed, 100.1, 2, stamp=now + 1) is None
+
+
+def test_sealed_packets_are_not_believed_again_however_long_their_sender_is_silent(keyed):
+    now, entries = CLOCK.now(), []
+    for run, begun_s, ticks in ((7, 100.0, now - 1000), (8, 150.0, now)):
+        for k in range(10):
+            entries.append({"seq": k, "run": run, "stamp": ticks + k})
+            assert problem(keyed, begun_s + 0.1 * k, **entries[-1]) is None
+    for entry in entries:
+        assert problem(keyed, 600.0, **entry)[0] == "replayed"
+
+
+def sealed(key, seq, fixes=(), game=None):
+    """A true packet."""
+    return Seal(key).close(Packet("hub", 1, seq, fixes=fixes, game=game, stamp=CLOCK.take()).encode())
+
+
+def test_a_sealed_packet_is_taken_once(keyed):
+    data = sealed(KEY, 1, fixes=(TRUE,))
+    for _ in range(3):
+        keyed.take(data, LOCAL)
+    assert [found.boat for found in keyed.read()] == ["red_1"]
+    assert keyed.faults() == {"replayed": 2}
+
+
+@pytest.mark.parametrize("content", [{"fixes": (TRUE,)}, {"game": game_of()}], ids=["positions", "game"])
+def test_what_is_not_sealed_with_the_key_is_dropped_and_counted_by_kind(keyed, content):
+    good = sealed(KEY, 1, **content)
+    bare = good[:-SEAL_BYTES]
+    assert json.loads(bare)["stamp"] > 0
+    changed = bare.replace(b'"seq":1', b'"seq":9') + good[-SEAL_BYTES:]
+    for data in (bare, bare + b"\n", bare + b"\nhmac-sha256:" + b"0" * 63, b"", b"\nhmac-sha256:"):
+        keyed.take(data, LOCAL)
+    for data in (sealed(OTHER, 1, **content), changed, bare + b"\nhmac-sha256:" + b"0" * 64, good[1:]):
+        keyed.take(data, LOCAL)
+    assert keyed.faults() == {"unsigned": 5, "bad_signature": 4}
+    assert (keyed.read(), keyed.game()) == ((), None)
+    assert keyed.alarms() == (), "nobody without the key can make an alarm"
+
+
+def test_a_sender_of_your_own_as_documented_is_heard(keyed):
+    text = (Path(__file__).parents[3] / "docs" / "boat_reference.md").read_text()
+    (block,) = (part.split("```")[0] for part in text.split("```python\n")[1:] if "feed_key" in part)
+    packet = json.loads(Packet("mine", 1, 1, fixes=(TRUE,)).encode())
+    names = {"json": json, "hmac": hmac, "time": time, "packet": packet, "key": KEY}
+    exec(block, names)
+    keyed.take(names["datagram"], LOCAL)
+    assert [found.source for found in keyed.read()] == ["mine"]
+
+
+def test_every_changed_bit_is_found():
+    seal, data = Seal(KEY), sealed(KEY, 1, fixes=(TRUE,))
+    assert seal.fault(data) == ""
+    for at in range(len(data)):
+        for bit in range(8):
+            changed = bytearray(data)
+            changed[at] ^= 1 << bit
+            assert seal.fault(bytes(changed)), (at, bit)
+
+
+def test_keys_of_another_length_and_packets_that_leave_no_room_for_the_seal_are_refused():
+    with pytest.raises(ConfigError, match="32"):
+        FeedSender("hub", ["127.0.0.1:9"], b"short")
+    with pytest.raises(ConfigError, match="32"):
+        FeedReceiver("127.0.0.1:0", FRAME, ManualClock(), key=b"short")
+    assert not is_sealed(Packet("hub", 1, 1, fixes=(TRUE,)).encode())
+    with pytest.raises(FeedError, match="fewer boats"):
+        Packet("hub", 1, 1, fixes=(Fix("b" * 60, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0),) * 200).encode()
+    assert len(Seal(KEY).close(b"x" * (MAX_BYTES - SEAL_BYTES))) == MAX_BYTES
+
+
+def test_fixes_of_packets_that_were_held_back_are_not_fresh(keyed, monkeypatch):
+    now = keyed._stamps.now
+    held = [sealed(KEY, seq, fixes=(TRUE,)) for seq in (1, 2)]
+    keyed.take(held[0], LOCAL)
+    monkeypatch.setattr(keyed._stamps, "now", lambda: now() + 30 * TICKS_PER_S)
+    keyed.take(held[1], LOCAL)
+    (contact,) = keyed.read()
+    assert 100.0 - contact.fixed_s == pytest.approx(30.0, abs=0.5)
+    assert keyed.faults() == {"late": 1}
+    assert "packets of hub come 30.0 s late" in keyed.fault_texts()["late"]
 
 
 def wait_for(condition, limit_s=10.0):
@@ -297,41 +461,50 @@ def wait_for(condition, limit_s=10.0):
         time.sleep(0.005)
 
 
+def hearing(key=None):
+    return FeedReceiver("127.0.0.1:0", FRAME, MonotonicClock(), boats=("red_1",), key=key)
+
+
+def flood(receiver, data, goes_on):
+    """Send a datagram again and again as long as told."""
+    host, port = receiver.address.rsplit(":", 1)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
+        while goes_on():
+            out.sendto(data, (host, int(port)))
+
+
 def test_a_second_hub_on_the_same_file_is_said_and_the_first_goes_on():
+    def fix(speed):
+        return [Fix("red_1", 42.0, -71.0, 75.0, speed, 0.0, 0.5)]
+
     with (
-        FeedReceiver("127.0.0.1:0", FRAME, MonotonicClock(), boats=("red_1",)) as receiver,
+        hearing() as receiver,
         FeedSender("gps_hub", [receiver.address]) as first,
         FeedSender("gps_hub", [receiver.address]) as second,
     ):
-        first.send_positions([Fix("red_1", 42.0, -71.0, 75.0, 1.0, 0.0, 0.5)])
+        first.send_positions(fix(1.0))
         wait_for(receiver.read)
         assert receiver.alarms() == ()
         for _ in range(10):
-            second.send_positions([Fix("red_1", 42.0001, -71.0, 75.0, 2.0, 0.0, 0.5)])
-            first.send_positions([Fix("red_1", 42.0, -71.0, 75.0, 1.0, 0.0, 0.5)])
+            second.send_positions(fix(2.0))
+            first.send_positions(fix(1.0))
         wait_for(lambda: receiver.faults().get("second run") == 10)
         assert [found.speed_mps for found in receiver.read()] == [1.0, 2.0], "the other may be the right one"
         (alarm,) = receiver.alarms()
         assert "two programs send as gps_hub; end one of them" in alarm.text
 
 
-def test_what_cannot_be_sent_is_said_at_the_sender():
+def test_what_cannot_be_sent_and_addresses_that_are_none_are_one_clear_error(receiver):
     with FeedSender("hub", ["127.0.0.1:9"]) as sender:
         with pytest.raises(FeedError, match="give finite numbers"):
             sender.send_positions([Fix("red_1", math.nan, 0.0, 0.0, 0.0, 0.0, 0.0)])
         with pytest.raises(FeedError, match="fewer boats"):
             sender.send_positions([Fix("b" * 60, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)] * 250)
-    with pytest.raises(ConfigError, match="no address"):
-        FeedSender("hub", ["127.0.0.1"])
-    with pytest.raises(ConfigError, match="nobody knows the host"):
-        FeedSender("hub", ["no such host.invalid:9"])
-
-
-def test_a_taken_port_and_wrong_addresses_are_one_clear_error():
-    with FeedReceiver("127.0.0.1:0", FRAME, ManualClock()) as receiver:
-        with pytest.raises(BridgeError, match=r"cannot hear the feed at .* give another address"):
-            FeedReceiver(receiver.address, FRAME, ManualClock())
-        receiver.close()
+    for address, words in (("127.0.0.1", "no address"), ("no such host.invalid:9", "nobody knows the host")):
+        with pytest.raises(ConfigError, match=words):
+            FeedSender("hub", [address])
+    with pytest.raises(BridgeError, match=r"cannot hear the feed at .* give another address"):
+        FeedReceiver(receiver.address, FRAME, ManualClock())
     with pytest.raises(ConfigError, match='give "HOST:PORT"'):
         FeedReceiver("14700", FRAME, ManualClock())
     with pytest.raises(ConfigError, match="no host to allow"):
@@ -339,28 +512,22 @@ def test_a_taken_port_and_wrong_addresses_are_one_clear_error():
 
 
 def test_a_flood_is_dropped_and_afterwards_packets_are_fresh_again():
-    with FeedReceiver("127.0.0.1:0", FRAME, MonotonicClock(), boats=("red_1",)) as receiver:
-        data = positions(contact())
+    with hearing() as receiver, FeedSender("hub2", [receiver.address]) as sender:
         stop = threading.Event()
-        host, port = receiver.address.rsplit(":", 1)
-
-        def flood():
-            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
-                while not stop.is_set():
-                    out.sendto(data, (host, int(port)))
-
-        thread = threading.Thread(target=flood)
+        thread = threading.Thread(target=flood, args=(receiver, positions(contact()), lambda: not stop.is_set()))
         thread.start()
         try:
             wait_for(lambda: "flood" in receiver.faults(), 30.0)
         finally:
             stop.set()
             thread.join()
-        with FeedSender("hub2", [receiver.address]) as sender:
-            wait_for(lambda: sender.send_positions([fresh()]) or receiver.read()[0].source == "hub2", 20.0)
-        assert receiver.read()[0].source == "hub2"
+        wait_for(lambda: sender.send_positions([TRUE]) or time.sleep(0.01) or receiver.read()[0].source == "hub2", 20.0)
 
 
-def fresh():
-    time.sleep(0.01 + 0.001 * random.random())
-    return Fix("red_1", 42.0, -71.0, 0.0, 1.0, 0.0, 0.1)
+def test_forged_packets_cost_a_tenth_so_that_more_of_them_leave_the_true_ones_room():
+    with hearing(KEY) as receiver, FeedSender("gps_hub", [receiver.address], KEY) as hub:
+        left = iter(range(3000))
+        data = Packet("gps_hub", 4711, 1, fixes=(TRUE,), stamp=CLOCK.now()).encode()
+        flood(receiver, data, lambda: time.sleep(0.0001) or next(left, None) is not None)
+        wait_for(lambda: hub.send_positions([TRUE]) or time.sleep(0.02) or receiver.read())
+        assert "flood" not in receiver.faults()
