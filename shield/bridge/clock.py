@@ -1,4 +1,4 @@
-"""Clocks of the loop: monotonic only, so that a step of the wall clock changes nothing."""
+"""Clocks of the loop: monotonic only, so that a step of the wall clock changes nothing; time asleep counts."""
 
 from __future__ import annotations
 
@@ -18,6 +18,12 @@ class Clock(Protocol):
         """Return at that time, at once if it is past."""
 
 
+def machine_s() -> float:
+    """Monotonic time of the machine, s. Time that a computer spends asleep counts: what was known before is old."""
+    boot = getattr(time, "CLOCK_BOOTTIME", None)  # Linux, whose `time.monotonic` stands still meanwhile
+    return time.monotonic() if boot is None else time.clock_gettime(boot)
+
+
 class MonotonicClock:
     """The machine's monotonic clock, optionally faster, for simulated boats that run faster than real time.
 
@@ -35,11 +41,11 @@ class MonotonicClock:
 
     def now_s(self) -> float:
         """Monotonic time times ``speed``, s."""
-        return time.monotonic() * self.speed
+        return machine_s() * self.speed
 
     def sleep_until(self, time_s: float) -> None:
         """Sleep to that time of this clock."""
-        wait = time_s / self.speed - time.monotonic()
+        wait = time_s / self.speed - machine_s()
         if wait > 0.0:
             time.sleep(wait)
 
