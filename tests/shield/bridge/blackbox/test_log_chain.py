@@ -16,7 +16,6 @@ from steerclear.shield.bridge.blackbox.format import tick_to_json
 from steerclear.shield.bridge.blackbox.hash_chain import Chain, ChainHead
 from steerclear.shield.exceptions import LogError
 
-quick = settings(max_examples=80, deadline=None, derandomize=True)
 STEPS = 40
 KEY, OTHER_KEY = bytes(range(32)), bytes(32)
 
@@ -52,14 +51,11 @@ def said(path, key=None):
     return "; ".join(check(path, key)[0].breaks)
 
 
-def test_a_log_as_it_was_written_has_a_chain_that_holds(log):
+def test_a_log_as_it_was_written_has_a_chain_that_holds_and_every_record_is_under_a_link(log):
     chain, numbers = check(log)
     assert chain.holds
     assert (chain.chained, chain.keyed, chain.broken, chain.breaks) == (True, False, 0, [])
     assert numbers == list(range(STEPS))
-
-
-def test_every_record_is_under_a_link_and_the_last_says_how_many_there_are(log):
     records = read_records(log)
     links = [record.content for record in records if record.topic == "/link"]
     assert len(links) >= STEPS
@@ -67,8 +63,6 @@ def test_every_record_is_under_a_link_and_the_last_says_how_many_there_are(log):
     assert links[-1]["end"] == "log"
     assert links[-1]["count"] == len(records) - len(links)
     assert [link["end"] for link in links[:-1]] == [""] * (len(links) - 1)
-    head = json.loads(records[0].content["chain"])
-    assert re.fullmatch(r"[0-9a-f]{64}", head["head"])
 
 
 def at(records, topic, number):
@@ -142,7 +136,7 @@ def test_a_link_where_the_change_is_names_it(log, tmp_path):
     assert int(after) - int(before) < 10
 
 
-@quick
+@settings(max_examples=30, deadline=None, derandomize=True)
 @given(data=st.data())
 def test_no_record_but_links_can_be_left_out_doubled_or_moved(log, tmp_path_factory, data):
     records = read_records(log)
@@ -155,29 +149,12 @@ def test_no_record_but_links_can_be_left_out_doubled_or_moved(log, tmp_path_fact
         "twice": [*records[:place], records[k], *records[place:]],
         "move": [*rest[:place], records[k], *rest[place:]],
     }[how]
-    if forged == records or k == 0:
-        return
-    path = write_records(tmp_path_factory.mktemp("forged") / "x.mcap", forged)
-    chain, _ = check(path)
-    assert not chain.holds
+    if forged != records and k != 0:
+        assert said(write_records(tmp_path_factory.mktemp("forged") / "x.mcap", forged))
 
 
-@quick
-@given(share=st.floats(0.0, 1.0))
-def test_a_log_that_was_killed_is_no_forgery(log, tmp_path_factory, share):
-    whole = log.read_bytes()
-    path = tmp_path_factory.mktemp("killed") / "x.mcap"
-    path.write_bytes(whole[: int(share * (len(whole) - 100))])  # the footer is gone
-    try:
-        with LogReader(path) as reader:
-            list(reader.ticks())
-            assert not reader.complete
-            assert reader.chain.holds
-    except LogError:
-        assert share < 0.5, "cut off before its header"
-
-
-def test_a_keyed_chain_is_checked_with_its_key_only(tmp_path, ticks):
+def test_a_keyed_chain_is_checked_with_its_key_only_and_a_log_without_codes_is_not_taken_for_one(tmp_path, ticks, log):
+    assert "carries no codes, though a key was given" in said(log, KEY)
     path = write(tmp_path / "run.mcap", ticks, key=KEY)
     chain, _ = check(path)
     assert (chain.holds, chain.keyed, chain.codes_checked) == (True, True, 0)
@@ -210,23 +187,15 @@ def test_a_forger_who_makes_the_chain_anew_is_found_by_the_key_alone(tmp_path, t
     assert "is not of this key" in said(forged, KEY)
 
 
-def test_a_log_without_codes_is_not_taken_for_one_with(tmp_path, log):
-    assert "carries no codes, though a key was given" in said(log, KEY)
+COUNTS = [f'{{"head": "{"0" * 64}", "count": {count}}}' for count in ('"3"', "1.5", "true", "-1", "1e400")]
 
 
-@pytest.mark.parametrize("chain", ["null", "{}", '{"head": "zz"}', '{"head": 5}', "[", '{"head": "", "count": -1}'])
+@pytest.mark.parametrize("chain", ["null", "{}", '{"head": "zz"}', '{"head": 5}', "[", *COUNTS])
 def test_a_header_without_a_sound_head_is_damaged(log, tmp_path, chain):
-    records = read_records(log)
+    records = [record for record in read_records(log) if record.topic != "/link"]
     path = write_records(tmp_path / "x.mcap", [records[0].with_content(chain=chain), *records[1:]])
     with pytest.raises(LogError, match="head of its chain"):
         LogReader(path)
-
-
-def test_a_chain_that_was_taken_out_is_no_log(log, tmp_path):
-    records = [record for record in read_records(log) if record.topic != "/link"]
-    write_records(tmp_path / "bare.mcap", [records[0].with_content(chain="null"), *records[1:]])
-    with pytest.raises(LogError, match="no head of its chain"):
-        LogReader(tmp_path / "bare.mcap")
 
 
 LOG_080 = Path(__file__).parents[1] / "data" / "log_0.8.0.mcap"
@@ -261,9 +230,3 @@ def test_a_log_of_another_version_is_refused_by_the_one_that_wrote_it(log, tmp_p
     write_records(tmp_path / "old.mcap", [records[0].with_content(version=1, versions=versions), *records[1:]])
     with pytest.raises(LogError, match=r"version 1, .* use the one that wrote it, steerclear 0.6.1"):
         LogReader(tmp_path / "old.mcap")
-
-
-@pytest.mark.parametrize("count", ['"3"', "1.5", "true", "-1", "1e400"])
-def test_a_head_whose_count_is_no_whole_number_is_damaged(count):
-    with pytest.raises(LogError, match="holds no head of its chain"):
-        ChainHead.from_text(f'{{"head": "{"0" * 64}", "count": {count}}}')

@@ -1,17 +1,20 @@
-"""Ticks and headers through JSON and back: nothing is lost that the shield was given or answered."""
+"""Ticks and headers through JSON and back: nothing is lost, and every message is valid by the log's own schema."""
 
 import contextlib
 import dataclasses
 import json
 import math
 
+import jsonschema
 import numpy as np
 import pytest
+from forged_logs import read_records
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from logged_runs import Encounter, header_of
 from steerclear.shield import Commands, Fleet, ShieldConfig, Surroundings
-from steerclear.shield.bridge.blackbox.format import tick_from_json, tick_to_json
+from steerclear.shield.bridge.blackbox import McapWriter
+from steerclear.shield.bridge.blackbox.format import TICK, tick_from_json, tick_to_json
 from steerclear.shield.bridge.blackbox.header import LogHeader, platforms_of
 from steerclear.shield.bridge.messages import Action, BoatReading, Contact, Sent, Tick
 from steerclear.shield.decision import Decisions
@@ -21,11 +24,15 @@ from steerclear.shield.platforms import layout as L
 
 quick = settings(max_examples=60, deadline=None, derandomize=True)
 HERON = platforms_of(["heron"])
+CHECKERS = (jsonschema.Draft7Validator, jsonschema.Draft202012Validator)
+
+
+def first_tick():
+    return next(iter(Encounter(header_of(), 1)))
 
 
 def through_json(tick, platforms=HERON):
-    text = json.dumps(tick_to_json(tick, platforms), allow_nan=False)
-    return tick_from_json(json.loads(text), platforms)
+    return tick_from_json(json.loads(json.dumps(tick_to_json(tick, platforms), allow_nan=False)), platforms)
 
 
 def same(a, b):
@@ -52,19 +59,18 @@ anything = st.recursive(
 )
 
 
-def arrays(*shape):
+def arrays(*shape, of=floats, dtype=np.float64):
     size = math.prod(shape)
-    return st.lists(floats, min_size=size, max_size=size).map(lambda v: np.array(v, dtype=np.float64).reshape(shape))
+    return st.lists(of, min_size=size, max_size=size).map(lambda v: np.array(v, dtype=dtype).reshape(shape))
 
 
 @st.composite
 def fleets(draw, n):
-    flags = st.lists(st.booleans(), min_size=n, max_size=n)
     return Fleet(
         state=draw(arrays(n, L.N_STATE)),
-        team=np.array(draw(st.lists(st.integers(0, 2), min_size=n, max_size=n)), dtype=np.int64),
+        team=draw(arrays(n, of=st.integers(0, 2), dtype=np.int64)),
         platforms=tuple(draw(st.lists(st.sampled_from(sorted(PLATFORMS)), min_size=n, max_size=n))),
-        controlled=np.array(draw(flags), dtype=np.bool_),
+        controlled=draw(arrays(n, of=st.booleans(), dtype=np.bool_)),
         names=tuple(f"boat_{i}" for i in range(n)),
         age_s=draw(st.none() | arrays(n)),
         position_error_m=draw(st.none() | arrays(n)),
@@ -74,16 +80,15 @@ def fleets(draw, n):
 @st.composite
 def decided(draw, fleet, wanted):
     n = len(fleet)
-    sent = wanted if draw(st.booleans()) else Commands(draw(arrays(n, 2)), draw(st.booleans()))
     return Decisions(
         fleet=fleet,
         nominal=wanted,
-        filtered=sent,
-        intervened=np.array(draw(st.lists(st.booleans(), min_size=n, max_size=n)), dtype=np.bool_),
-        reason=np.array(draw(st.lists(st.integers(0, 6), min_size=n, max_size=n)), dtype=np.int64),
+        filtered=wanted if draw(st.booleans()) else Commands(draw(arrays(n, 2)), draw(st.booleans())),
+        intervened=draw(arrays(n, of=st.booleans(), dtype=np.bool_)),
+        reason=draw(arrays(n, of=st.integers(0, 6), dtype=np.int64)),
         safety_margin_m=draw(arrays(n)),
         slack_m=draw(arrays(n)),
-        bound=np.array(draw(st.lists(st.integers(-2, n - 1), min_size=n, max_size=n)), dtype=np.int64),
+        bound=draw(arrays(n, of=st.integers(-2, n - 1), dtype=np.int64)),
         solve_time_s=draw(floats),
     )
 
@@ -93,17 +98,16 @@ def ticks(draw):
     fleet = draw(st.none() | st.integers(1, 4).flatmap(fleets))
     wanted = None if fleet is None else draw(st.none() | arrays(len(fleet), 2).map(lambda v: Commands(v, True)))
     metres = st.floats(-1e6, 1e6)
+    circle = st.tuples(metres, metres, st.floats(0.0, 9.0))
     fixed = Surroundings(
         field=(-5.0, -5.0, 85.0, 45.0),
-        circles=draw(st.lists(st.tuples(metres, metres, st.floats(0.0, 9.0)), max_size=2)),
+        circles=draw(st.lists(circle, max_size=2)),
         polygons=draw(st.lists(st.lists(st.tuples(metres, metres), min_size=3, max_size=4), max_size=2)),
         keep_out=[(1.0, 2.0, 3.0)],
-        stops=draw(st.lists(st.tuples(metres, metres, st.floats(0.0, 9.0)), max_size=1)),
+        stops=draw(st.lists(circle, max_size=1)),
     )
-    reading = BoatReading(
-        "blue_1", draw(floats), (draw(floats), draw(floats)), heading_rad=draw(floats), texts=(draw(words),),
-        faults={"signature": draw(st.integers(0, 9))}, mode=draw(words),
-    )  # fmt: skip
+    faults, place = {"signature": draw(st.integers(0, 9))}, (draw(floats), draw(floats))
+    said = {"heading_rad": draw(floats), "texts": (draw(words),), "faults": faults, "mode": draw(words)}
     around = draw(st.sampled_from([None, fixed, Surroundings()]))
     decisions = None if wanted is None else draw(st.none() | decided(fleet, wanted))
     return Tick(
@@ -111,7 +115,7 @@ def ticks(draw):
         due_s=draw(floats),
         began_s=draw(floats),
         sent_s=draw(floats),
-        readings={"blue_1": reading},
+        readings={"blue_1": BoatReading("blue_1", draw(floats), place, **said)},
         contacts=(Contact("red_1", (draw(floats), 0.0), draw(floats), 1.0, 2.0, 0.3, draw(words)),),
         fleet=fleet,
         wanted=wanted,
@@ -127,51 +131,114 @@ def ticks(draw):
 
 @quick
 @given(ticks())
-def test_any_tick_comes_back_bit_for_bit(tick):
-    assert same(tick, through_json(tick))
+def test_any_tick_is_valid_and_comes_back_bit_for_bit(tick):
+    message = json.loads(json.dumps(tick_to_json(tick, HERON), allow_nan=False))
+    jsonschema.Draft7Validator(TICK).validate(message)
+    assert same(tick, tick_from_json(message, HERON))
 
 
-def test_a_platform_the_header_does_not_hold_is_written_out():
-    own = dataclasses.replace(get_platform("heron"), name="tub", max_speed_mps=1.25)
-    tick = next(iter(Encounter(header_of(), 1)))
-    fleet = dataclasses.replace(tick.fleet, platforms=(own, "surveyor", "heron", "heron"))
-    back = through_json(dataclasses.replace(tick, fleet=fleet)).fleet
-    assert tuple(map(get_platform, back.platforms)) == tuple(map(get_platform, fleet.platforms))
+def odd_tick(number, tick):
+    """Ticks in which something is not finite, or not there."""
+    state = tick.fleet.state.copy()
+    state[2:, 4:] = math.nan
+    fleet = dataclasses.replace(tick.fleet, state=state, age_s=np.array([0.0, math.inf, math.nan, 0.1]))
+    wanted = dataclasses.replace(tick.wanted, values=np.full((4, 2), math.nan))
+    margins = np.array([math.inf, -math.inf, math.nan, 1.0])
+    odd = {"fleet": fleet, "nominal": wanted, "safety_margin_m": margins, "solve_time_s": math.nan}
+    decisions = dataclasses.replace(tick.decisions, **odd)
+    odd = {"course_rad": math.nan, "turn_rate_age_s": math.inf, "position_m": (math.nan, 1.0)}
+    readings = {"blue_1": dataclasses.replace(tick.readings["blue_1"], **odd)}
+    odd = {"heading_rad": math.nan, "speed_mps": math.nan, "delivered": False}
+    sent = {"blue_1": dataclasses.replace(tick.sent["blue_1"], **odd)}
+    parts = {"fleet": fleet, "wanted": wanted, "decisions": decisions, "readings": readings, "sent": sent}
+    odd = dataclasses.replace(tick, **parts, policy_age_s=math.inf)
+    bare = dataclasses.replace(tick, fleet=None, wanted=None, decisions=None, readings={}, contacts=(), sent={})
+    return (odd, bare, tick)[number % 3]
 
 
-def test_a_platform_whose_parameters_have_changed_since_is_the_logs():
-    other = dataclasses.replace(get_platform("heron"), max_speed_mps=1.5)
-    tick = next(iter(Encounter(header_of(), 1)))
-    fleet = dataclasses.replace(tick.fleet, platforms=(other,) * 4)
-    back = through_json(dataclasses.replace(tick, fleet=fleet), {"heron": other}).fleet
-    assert set(map(get_platform, back.platforms)) == {other}
+def test_every_message_of_a_log_is_valid_and_what_is_not_finite_was_in_it(tmp_path):
+    writer = McapWriter(tmp_path / "run.mcap", header_of(), flush_s=0.0, key=bytes(32))
+    for number, tick in enumerate(Encounter(header_of(), 9)):
+        writer.take(dataclasses.replace(odd_tick(number, tick), number=number))
+    writer.note("a line")
+    writer.close()
+    assert writer.fault == ""
+    topics, odd = set(), []
+    for record in read_records(tmp_path / "run.mcap"):
+        schema = json.loads(record.schema[2])
+        for checker in CHECKERS:
+            checker.check_schema(schema)
+            errors = [error.message for error in checker(schema).iter_errors(record.content)]
+            assert errors == [], record.topic
+        topics.add(record.topic)
+        odd += record.content["odd"] if record.topic == "/tick" else []
+    assert {"/header", "/tick", "/log", "/scene", "/field", "/fix/red_1", "/link"} <= topics
+    places = {entry["at"].split(".", 1)[0] for entry in odd}
+    assert {"boats", "readings", "sent", "policy_age_s", "solve_time_s"} <= places
+    assert {"nan", "inf", "-inf"} <= {entry["value"] for entry in odd}
 
 
-@pytest.mark.parametrize("key", ["boats", "number", "readings", "began_s", "has_fleet"])
-def test_a_tick_without_a_part_is_refused(key):
-    message = tick_to_json(next(iter(Encounter(header_of(), 1))), HERON)
-    del message[key]
-    with pytest.raises(LogError, match="damaged or of another version"):
-        tick_from_json(message, HERON)
+def test_a_gap_is_left_for_viewers_and_a_zero_in_a_list():
+    message = tick_to_json(odd_tick(0, first_tick()), HERON)
+    first, second, third, _ = message["boats"]
+    assert "safety_margin_m" not in first
+    assert "safety_margin_m" not in second
+    assert third["state"][4:] == [0.0] * 7
+    assert first["wanted"] == []
+    assert message["readings"][0]["position_m"] == [0.0, 1.0]
+    assert "policy_age_s" not in message
 
 
 @pytest.mark.parametrize(
-    ("key", "is_refused"),
-    [("field", True), ("circles", True), ("polygons", True), ("keep_out", True), ("stops", False)],
+    "entries",
+    [
+        [{"at": "boats.9.state.0", "value": "nan"}],
+        [{"at": "boats", "value": "nan"}, {"at": "boats.0", "value": "nan"}],
+        [{"at": "number", "value": "seven"}],
+        [{"at": "boats.0.state.50", "value": "nan"}],
+        [{"at": "boats.x", "value": "nan"}],
+        [{}],
+        5,
+        "nan",
+    ],
 )
-def test_surroundings_without_a_part_are_refused_except_stops_which_older_logs_lack(key, is_refused):
+def test_a_list_of_odd_numbers_that_does_not_fit_is_damage(entries):
+    message = tick_to_json(first_tick(), HERON)
+    with pytest.raises(LogError, match="damaged"):
+        tick_from_json({**message, "odd": entries}, HERON)
+
+
+def test_a_platform_that_the_header_does_not_hold_or_that_has_changed_since_is_the_logs():
+    tub = dataclasses.replace(get_platform("heron"), name="tub", max_speed_mps=1.25)
+    changed = dataclasses.replace(get_platform("heron"), max_speed_mps=1.5)
+    tick = first_tick()
+    for kinds, known in (((tub, "surveyor", "heron", "heron"), HERON), ((changed,) * 4, {"heron": changed})):
+        fleet = dataclasses.replace(tick.fleet, platforms=kinds)
+        back = through_json(dataclasses.replace(tick, fleet=fleet), known).fleet
+        assert tuple(map(get_platform, back.platforms)) == tuple(map(get_platform, kinds))
+
+
+@pytest.mark.parametrize(
+    ("part", "is_refused"),
+    [
+        *((key, True) for key in ("boats", "number", "readings", "began_s", "has_fleet")),
+        *((f"surroundings.{key}", True) for key in ("field", "circles", "polygons", "keep_out")),
+        ("surroundings.stops", False),  # which older logs lack
+    ],
+)
+def test_a_tick_without_a_part_is_refused(part, is_refused):
     fixed = Surroundings(field=(-5.0, -5.0, 85.0, 45.0), keep_out=[(1.0, 2.0, 3.0)])
-    tick = dataclasses.replace(next(iter(Encounter(header_of(), 1))), surroundings=fixed)
-    message = tick_to_json(tick, HERON)
-    del message["surroundings"][0][key]
-    with pytest.raises(LogError, match="damaged") if is_refused else contextlib.nullcontext():
+    message = tick_to_json(dataclasses.replace(first_tick(), surroundings=fixed), HERON)
+    owner, _, key = part.rpartition(".")
+    del (message[owner][0] if owner else message)[key]
+    with pytest.raises(LogError, match="damaged or of another") if is_refused else contextlib.nullcontext():
         tick_from_json(message, HERON)
 
 
 @quick
 @given(st.data())
 def test_a_tick_with_anything_in_it_reads_or_is_refused(data):
-    message = tick_to_json(next(iter(Encounter(header_of(), 1))), HERON)
+    message = tick_to_json(first_tick(), HERON)
     key = data.draw(st.sampled_from(sorted(message)))
     message[key] = data.draw(anything)
     with contextlib.suppress(LogError):  # and nothing else
@@ -181,8 +248,7 @@ def test_a_tick_with_anything_in_it_reads_or_is_refused(data):
 def test_a_header_comes_back():
     config = ShieldConfig(cbf_rate_per_s=math.inf, edge_m=None, max_track_age_s=math.inf, delay_s=0.1 + 0.2)
     header = header_of(config, notes={"accepted": "rates:blue_1"})
-    back = LogHeader.from_message(json.loads(json.dumps(header.to_message(), allow_nan=False)))
-    assert back == header
+    assert LogHeader.from_message(json.loads(json.dumps(header.to_message(), allow_nan=False))) == header
 
 
 def test_a_header_with_a_setting_nobody_knows_says_who_wrote_it():
