@@ -1,7 +1,5 @@
 """One wire, several boats: each hears its own, nobody else gets in between, and nothing ends the thread."""
 
-import threading
-
 import pytest
 from fake_boat import FakeBoat, wait_for
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -18,7 +16,7 @@ class Ear:
     """Keeps what it is told."""
 
     def __init__(self):
-        self.messages, self.foreign, self.refused, self.ticks = [], [], [], 0
+        self.messages, self.foreign, self.refused = [], [], []
         self.breaks = False
 
     def on_message(self, message, received_s):
@@ -33,7 +31,7 @@ class Ear:
         self.refused.append(kind)
 
     def on_tick(self, now_s):
-        self.ticks += 1
+        pass
 
 
 @pytest.fixture
@@ -44,29 +42,38 @@ def endpoint():
     made.close()
 
 
-def test_two_boats_on_one_wire_are_kept_apart(endpoint):
-    one, two = Ear(), Ear()
-    endpoint.attach(1, one)
-    endpoint.attach(2, two)
-    with FakeBoat(endpoint.port, system_id=1) as boat_1, FakeBoat(endpoint.port, system_id=2) as boat_2:
-        assert wait_for(lambda: one.messages and two.messages)
-        assert {m.get_srcSystem() for m in one.messages} == {1}
-        assert {m.get_srcSystem() for m in two.messages} == {2}
+def attached(endpoint, count=1):
+    """Ears of the first boats; of one boat the ear itself."""
+    ears = [Ear() for _ in range(count)]
+    for i, ear in enumerate(ears, start=1):
+        endpoint.attach(i, ear)
+    return ears if count > 1 else ears[0]
+
+
+def test_boats_on_one_wire_are_kept_apart_and_strangers_go_to_everybody(endpoint):
+    ears = attached(endpoint, 2)
+    with (
+        FakeBoat(endpoint.port, system_id=1) as boat_1,
+        FakeBoat(endpoint.port, system_id=2) as boat_2,
+        FakeBoat(endpoint.port, system_id=9),
+    ):
+        assert wait_for(lambda: all(ear.messages and ear.foreign for ear in ears))
         assert endpoint.send(1, BEAT)
-        assert wait_for(lambda: boat_1.heard)
         for boat in (boat_1, boat_2):
             assert wait_for(lambda boat=boat: any(m.get_type() == "HEARTBEAT" for m in boat.heard))
+    for number, ear in enumerate(ears, start=1):
+        assert {m.get_srcSystem() for m in ear.messages} == {number}
+        assert {m.get_srcSystem() for m in ear.foreign} == {9}
 
 
 def test_one_system_id_for_two_links_is_refused(endpoint):
-    endpoint.attach(1, Ear())
+    attached(endpoint)
     with pytest.raises(LinkError, match=r"two links want system id 1 on udpin.*; give each boat its own SYSID_THISMAV"):
         endpoint.attach(1, Ear())
 
 
 def test_a_second_sender_with_the_boats_id_is_not_believed(endpoint):
-    ear = Ear()
-    endpoint.attach(1, ear)
+    ear = attached(endpoint)
     with FakeBoat(endpoint.port) as boat:
         assert wait_for(lambda: ear.messages)
         place = endpoint.place(1)
@@ -78,75 +85,55 @@ def test_a_second_sender_with_the_boats_id_is_not_believed(endpoint):
             assert not other.heard
 
 
-def test_nothing_is_sent_before_a_boat_was_heard(endpoint):
+def test_nothing_is_sent_before_a_boat_was_heard_nor_by_opening_alone(endpoint):
     assert not endpoint.send(1, BEAT)
-    endpoint.attach(1, Ear())
+    attached(endpoint)
     assert not endpoint.send(1, BEAT)
-
-
-def test_nothing_is_sent_by_opening_alone():
     with FakeBoat() as boat:
         made = Endpoint(f"udpout:127.0.0.1:{boat.port}", MonotonicClock())
         made.open()
         assert not wait_for(lambda: boat.heard, 0.3)
-        made.attach(1, Ear())
+        attached(made)
         assert wait_for(lambda: boat.heard)
         made.close()
 
 
-def test_strangers_go_to_everybody(endpoint):
-    ears = [Ear(), Ear()]
-    for i, ear in enumerate(ears):
-        endpoint.attach(i + 1, ear)
-    with FakeBoat(endpoint.port, system_id=9):
-        assert wait_for(lambda: all(ear.foreign for ear in ears))
-    assert not ears[0].messages
-
-
 def test_a_receiver_that_breaks_does_not_end_the_wire(endpoint):
-    bad, good = Ear(), Ear()
+    bad, good = attached(endpoint, 2)
     bad.breaks = True
-    endpoint.attach(1, bad)
-    endpoint.attach(2, good)
     with FakeBoat(endpoint.port, system_id=1), FakeBoat(endpoint.port, system_id=2):
         assert wait_for(lambda: len(good.messages) > 5)
     assert endpoint.faults["unexpected"] > 0
 
 
 def test_every_frame_is_recorded_and_a_failing_record_costs_no_link():
-    frames, ear = [], Ear()
-    calls = threading.Event()
+    frames = []
 
     def keep(direction, frame, unix_us):
         frames.append((direction, frame, unix_us))
         if len(frames) > 5:
-            calls.set()
             raise OSError("disk full")
 
     made = Endpoint("udpin:127.0.0.1:0", MonotonicClock(), on_bytes=keep)
-    made.attach(1, ear)
+    ear = attached(made)
     with FakeBoat(made.port):
-        assert calls.wait(10.0)
+        assert wait_for(lambda: made.faults["log"])
         seen = len(ear.messages)
         assert wait_for(lambda: len(ear.messages) > seen + 3)
     made.close()
     assert {direction for direction, _, _ in frames} == {"in", "out"}
     assert all(frame[0] == 0xFD and unix_us > 1.6e15 for _, frame, unix_us in frames)
-    assert made.faults["log"] > 0
 
 
 def test_with_signing_unsigned_and_wrongly_signed_boats_are_refused():
-    ear = Ear()
     made = Endpoint("udpin:127.0.0.1:0", MonotonicClock(), signing=Signing(KEY))
-    made.attach(1, ear)
-    with FakeBoat(made.port):
-        assert wait_for(lambda: "unsigned" in ear.refused)
-    with FakeBoat(made.port, key=KEY[::-1]):
-        assert wait_for(lambda: "bad_signature" in ear.refused)
+    ear = attached(made)
+    for key, fault in ((None, "unsigned"), (KEY[::-1], "bad_signature")):
+        with FakeBoat(made.port, key=key):
+            assert wait_for(lambda fault=fault: fault in ear.refused)
     assert not ear.messages
     with FakeBoat(made.port, key=KEY) as boat:
-        assert wait_for(lambda: ear.messages)
-        assert wait_for(lambda: boat.heard)
+        assert wait_for(lambda: ear.messages and boat.heard)
         assert all(m.get_header().incompat_flags & 1 for m in boat.heard)
         stolen = boat.send(mavlink.MAVLink_heartbeat_message(11, 3, 1, 0, 4, 3))
         boat.socket.sendto(stolen, ("127.0.0.1", made.port))
@@ -155,21 +142,18 @@ def test_with_signing_unsigned_and_wrongly_signed_boats_are_refused():
 
 
 def test_noise_is_counted_and_changes_nothing(endpoint):
-    ear = Ear()
-    endpoint.attach(1, ear)
+    ear = attached(endpoint)
     with FakeBoat(endpoint.port) as boat:
         assert wait_for(lambda: ear.messages)
         for noise in (b"\xfd" * 100, b"\x00" * 500, b"\xfe\xff" * 40, b""):
             boat.socket.sendto(noise, ("127.0.0.1", endpoint.port))
         seen = len(ear.messages)
-        assert wait_for(lambda: "bad_checksum" in ear.refused)
-        assert wait_for(lambda: len(ear.messages) > seen)
+        assert wait_for(lambda: "bad_checksum" in ear.refused and len(ear.messages) > seen)
 
 
-def test_the_wire_is_given_back_with_the_last_boat(endpoint):
+def test_the_wire_is_given_back_with_the_last_boat_and_can_be_attached_again(endpoint):
     port = endpoint.port
-    endpoint.attach(1, Ear())
-    endpoint.attach(2, Ear())
+    attached(endpoint, 2)
     endpoint.detach(1)
     assert endpoint.is_open
     endpoint.detach(2)
@@ -178,12 +162,6 @@ def test_the_wire_is_given_back_with_the_last_boat(endpoint):
     again.open()
     again.close()
     again.close()
-
-
-def test_a_wire_can_be_attached_again_after_it_was_given_back(endpoint):
-    endpoint.attach(1, Ear())
-    endpoint.detach(1)
-    ear = Ear()
-    endpoint.attach(1, ear)
+    ear = attached(endpoint)
     with FakeBoat(endpoint.port):
         assert wait_for(lambda: ear.messages)

@@ -65,18 +65,23 @@ def test_the_stop_without_a_heading_asks_for_no_turn_and_no_thrust():
     assert got.body_yaw_rate == got.thrust == 0.0
 
 
-def test_the_first_route_the_boat_can_is_chosen():
-    def chosen(route="auto", **abilities):
-        return choose_route(
-            "b", route, Abilities(**{"version": (4, 6, 0), "capabilities": ALL, "top_mps": 2.0} | abilities)
-        )
+def chosen(route="auto", **abilities):
+    found = {"version": (4, 6, 0), "capabilities": ALL, "top_mps": 2.0} | abilities
+    return choose_route("blue_1", route, Abilities(**found))
 
-    assert isinstance(chosen(), AttitudeRoute)
-    assert chosen().top_mps == 2.0
-    assert isinstance(chosen(top_mps=None), VelocityRoute)
-    assert isinstance(chosen(capabilities=128), VelocityRoute)
-    assert isinstance(chosen(route=ROUTES[1]), VelocityRoute)
-    assert isinstance(chosen(version=None), AttitudeRoute)
+
+@pytest.mark.parametrize(
+    ("settings", "route"),
+    [
+        ({}, AttitudeRoute(2.0)),
+        ({"version": None}, AttitudeRoute(2.0)),
+        ({"top_mps": None}, VelocityRoute(None)),
+        ({"capabilities": 128}, VelocityRoute(2.0)),
+        ({"route": ROUTES[1]}, VelocityRoute(2.0)),
+    ],
+)
+def test_the_first_route_the_boat_can_is_chosen(settings, route):
+    assert chosen(**settings) == route
 
 
 @pytest.mark.parametrize(
@@ -88,16 +93,14 @@ def test_the_first_route_the_boat_can_is_chosen():
         ({"top_mps": -1.0}, "WP_SPEED is -1"),
         ({"capabilities": 0}, "did not answer what it can do"),
         ({"capabilities": 64, "top_mps": None}, "cannot do SET_POSITION"),
+        ({"route": ROUTES[0], "top_mps": None}, "its WP_SPEED cannot be read"),  # not replaced by another
     ],
 )
 def test_a_boat_that_cannot_be_commanded_is_refused_with_the_reason(changes, words):
-    abilities = Abilities(**{"version": (4, 6, 0), "capabilities": ALL, "top_mps": 2.0} | changes)
     with pytest.raises(LinkRefused, match=words):
-        choose_route("blue_1", "auto", abilities)
+        chosen(**changes)
 
 
-def test_a_route_asked_for_by_name_is_not_replaced_by_another():
-    with pytest.raises(LinkRefused, match="its WP_SPEED cannot be read"):
-        choose_route("b", ROUTES[0], Abilities((4, 6, 0), ALL, None))
+def test_a_route_that_is_none_is_refused_with_those_there_are():
     with pytest.raises(LinkError, match="there is no route 'attitude'; give auto, SET_ATTITUDE_TARGET or"):
         check_route("attitude")

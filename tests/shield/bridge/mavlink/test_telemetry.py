@@ -1,4 +1,4 @@
-"""One boat's messages: true values pass with their ages, impossible ones are refused and named.
+"""One boat's messages: true values pass with their ages, impossible ones are refused and named; late is late.
 
 A position without a fix is none: by the receivers' word, by the filter's, by their silence; and back again.
 """
@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from steerclear.shield.bridge.frame import FieldFrame
-from steerclear.shield.bridge.mavlink.telemetry import FIX_SILENT_S, Streams, Telemetry
+from steerclear.shield.bridge.mavlink.telemetry import BELIEVED_AFTER, FIX_SILENT_S, BoatClock, Streams, Telemetry
 
 FRAME = FieldFrame(42.0, -71.0)
 OFFSET = 500.0
@@ -20,20 +20,17 @@ DT = 0.05
 class Boat:
     """Feeds a `Telemetry` with what a boat would send; ``now`` is its time since boot."""
 
-    def __init__(self):
+    def __init__(self, speed=0.0, rate=0.0):
         self.telemetry = Telemetry(FRAME)
         self.now, self.x, self.y = 20.0, 10.0, 10.0
-        self.speed, self.yaw, self.rate = 0.0, 1.0, 0.0
-        self.delay = 0.01
-        self.number = 0
-        self.texts = []
+        self.speed, self.yaw, self.rate = speed, 1.0, rate
+        self.delay, self.number, self.texts = 0.01, 0, []
 
-    def hear(self, message, delay=None):
+    def hear(self, message):
         self.number = (self.number + 1) % 256
         message._header.seq = self.number
-        text = self.telemetry.hear(message, self.now + OFFSET + (self.delay if delay is None else delay))
+        text = self.telemetry.hear(message, self.now + OFFSET + self.delay)
         self.texts += [text] if text else []
-        return text
 
     def position(self, **changes):
         latitude, longitude = FRAME.to_geodetic_deg(self.x, self.y)
@@ -72,50 +69,35 @@ class Boat:
         return self.now + OFFSET + self.delay - self.telemetry.position_s
 
 
-def test_what_a_boat_says_is_what_is_read():
-    boat = Boat()
-    boat.speed, boat.rate = 1.5, 0.1
-    boat.run(3.0)
+@pytest.mark.parametrize("speed", [1.5, -0.8])
+def test_what_a_boat_says_is_what_is_read(speed):
+    boat = Boat(speed, rate=0.1).run(3.0)
     seen = boat.telemetry
     assert seen.position_m == pytest.approx((boat.x, boat.y), abs=0.02)
     assert seen.heading[0] == pytest.approx(boat.yaw, abs=1e-6)
-    assert seen.speed_mps == pytest.approx(1.5, abs=0.01)
-    assert seen.course_rad == pytest.approx(boat.yaw, abs=0.02)
+    assert seen.speed_mps == pytest.approx(speed, abs=0.01), "negative astern"
+    astern = math.pi if speed < 0.0 else 0.0
+    assert math.remainder(seen.course_rad - boat.yaw - astern, 2.0 * math.pi) == pytest.approx(0.0, abs=0.02)
     assert seen.turn_rate_rads == pytest.approx(0.1)
     assert boat.age() == pytest.approx(0.0, abs=0.011)
     assert not seen.faults
 
 
-def test_a_boat_going_astern_has_a_negative_speed():
-    boat = Boat()
-    boat.speed = -0.8
-    boat.run(1.0)
-    assert boat.telemetry.speed_mps == pytest.approx(-0.8, abs=0.01)
-
-
-def test_older_messages_never_replace_newer_ones():
-    boat = Boat()
-    boat.speed = 1.0
-    boat.run(2.0)
+def test_older_messages_never_replace_newer_ones_and_the_same_packet_twice_is_counted():
+    boat = Boat(1.0).run(2.0)
     late = boat.position()
     boat.run(0.5)
     place = boat.telemetry.position_m
     boat.hear(late)
     assert boat.telemetry.position_m == place
     assert boat.telemetry.faults == {"out_of_order": 1}
-
-
-def test_the_same_packet_twice_is_counted_and_the_same_instant_again_is_not():
-    boat = Boat()
-    boat.run(1.0)
     boat.now += DT
     packet = boat.position()
     boat.hear(packet)
     boat.number -= 1
     boat.hear(packet)
-    assert boat.telemetry.faults == {"duplicate": 1}
-    boat.hear(boat.position())
-    assert boat.telemetry.faults == {"duplicate": 1}
+    boat.hear(boat.position())  # the same instant again under a new number is no fault
+    assert boat.telemetry.faults == {"out_of_order": 1, "duplicate": 1}
 
 
 @pytest.mark.parametrize(
@@ -128,27 +110,20 @@ def test_the_same_packet_twice_is_counted_and_the_same_instant_again_is_not():
         ({"lat": 500_000_000}, "impossible_position"),
         ({"vx": 32_767}, "impossible_speed"),
         ({"vy": -32_768}, "impossible_speed"),
+        ({"yaw": math.nan}, "impossible_attitude"),
+        ({"yaw": 1e9}, "impossible_attitude"),
+        ({"yawspeed": math.inf}, "impossible_attitude"),
+        ({"yawspeed": -50.0}, "impossible_attitude"),
     ],
 )
-def test_impossible_positions_are_refused_and_named(changes, fault):
-    boat = Boat()
-    boat.run(1.0)
-    before = (boat.telemetry.position_m, boat.telemetry.velocity_mps)
+def test_impossible_values_are_refused_and_named(changes, fault):
+    boat = Boat().run(1.0)
+    seen = boat.telemetry
+    before = (seen.position_m, seen.velocity_mps, seen.heading)
     boat.now += DT
-    boat.hear(boat.position(**changes))
-    assert boat.telemetry.faults == {fault: 1}
-    assert (boat.telemetry.position_m, boat.telemetry.velocity_mps) == before
-
-
-@pytest.mark.parametrize("changes", [{"yaw": math.nan}, {"yaw": 1e9}, {"yawspeed": math.inf}, {"yawspeed": -50.0}])
-def test_impossible_attitudes_are_refused(changes):
-    boat = Boat()
-    boat.run(1.0)
-    before = boat.telemetry.heading
-    boat.now += DT
-    boat.hear(boat.attitude(**changes))
-    assert boat.telemetry.faults == {"impossible_attitude": 1}
-    assert boat.telemetry.heading == before
+    boat.hear(boat.attitude(**changes) if fault == "impossible_attitude" else boat.position(**changes))
+    assert seen.faults == {fault: 1}
+    assert (seen.position_m, seen.velocity_mps, seen.heading) == before
 
 
 def test_attitude_of_the_first_second_is_not_believed():
@@ -157,30 +132,26 @@ def test_attitude_of_the_first_second_is_not_believed():
     boat.run(0.6)
     assert boat.telemetry.turn_rate_s == -math.inf
     assert boat.telemetry.faults["settling"] > 0
-    boat.run(1.0)
-    assert boat.telemetry.turn_rate_s > 0.0
+    assert boat.run(1.0).telemetry.turn_rate_s > 0.0
 
 
 def test_without_attitude_the_heading_is_the_position_messages():
     boat = Boat()
-    boat.now += DT
-    boat.hear(boat.position())
-    assert boat.telemetry.heading[0] == pytest.approx(1.0, abs=1e-3)
-    boat.now += DT
-    boat.hear(boat.position(hdg=65_535))
+    for heading in ({}, {"hdg": 65_535}):
+        boat.now += DT
+        boat.hear(boat.position(**heading))
+        assert boat.telemetry.heading[0] == pytest.approx(1.0, abs=1e-3)
     assert boat.telemetry.heading[1] < boat.now + OFFSET - 0.5 * DT, "an unknown heading is none"
 
 
 def test_a_restart_is_told_and_nothing_old_is_kept():
-    boat = Boat()
-    boat.run(2.0)
-    texts = []
+    boat = Boat().run(2.0)
     boat.delay += boat.now - 1.5
     boat.now = 1.5
     for _ in range(20):
         boat.now += DT
-        texts.append(boat.hear(boat.position()))
-    assert sum("restarted" in text for text in texts) == 1
+        boat.hear(boat.position())
+    assert sum("restarted" in text for text in boat.texts) == 1
     assert boat.telemetry.turn_rate_s == -math.inf
     assert boat.telemetry.position_m == pytest.approx((boat.x, boat.y), abs=0.02)
 
@@ -270,8 +241,7 @@ def test_a_receiver_that_falls_silent_has_lost_its_fix():
 def test_a_gap_of_the_whole_link_is_no_silence_of_the_receiver():
     boat = Boat().run(3.0, gps())
     boat.now += 30.0
-    boat.run(1.0)
-    assert boat.age() < 0.06
+    assert boat.run(1.0).age() < 0.06
     assert boat.run(FIX_SILENT_S).telemetry.faults["fix_silent"]
 
 
@@ -287,13 +257,91 @@ def test_one_receiver_with_a_fix_is_enough():
 
 
 def test_the_messages_are_asked_for_and_asked_again_once_they_stop():
-    streams = Streams(20.0)
-    gps_id = mavlink.MAVLINK_MSG_ID_GPS_RAW_INT
-    others = {mavlink.MAVLINK_MSG_ID_GPS2_RAW, mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT}
-    assert {gps_id, *others} <= {key for key, _ in streams.requests(0.0)}
+    streams, gps_id = Streams(20.0), mavlink.MAVLINK_MSG_ID_GPS_RAW_INT
+
+    def asked(now_s):
+        return {key for key, _ in streams.requests(now_s)}
+
+    assert {gps_id, mavlink.MAVLINK_MSG_ID_GPS2_RAW, mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT} <= asked(0.0)
     for k in range(1, 50):
-        streams.requests(2.1 * k)
-    assert gps_id not in {key for key, _ in streams.requests(120.0)}, "not given, not asked for ever"
+        asked(2.1 * k)
+    assert gps_id not in asked(120.0), "not given, not asked for ever"
     streams.hear(gps_id, 120.0)
-    assert gps_id not in {key for key, _ in streams.requests(122.5)}
-    assert gps_id in {key for key, _ in streams.requests(124.0)}
+    assert gps_id not in asked(122.5)
+    assert gps_id in asked(124.0)
+
+
+def heard(clock, boot_s, delay_s):
+    """Age on arrival of what was true at ``boot_s`` and took ``delay_s``; None: it is not believed."""
+    received = boot_s + OFFSET + delay_s
+    true = clock.hear(boot_s, received)
+    return None if true is None else received - true
+
+
+def warmed(delay_s=0.02):
+    clock = BoatClock()
+    for i in range(40):
+        heard(clock, 10.0 + 0.05 * i, delay_s + 0.001 * (i % 3))
+    return clock, 12.0
+
+
+def test_a_message_that_took_a_second_longer_is_a_second_old():
+    clock, now = warmed()
+    assert heard(clock, now, 1.02) == pytest.approx(1.0, abs=0.01)
+    assert heard(clock, now + 0.05, 0.02) == pytest.approx(0.0, abs=0.01)
+
+
+def test_a_delay_there_from_the_start_is_found_by_the_round_trip():
+    clock, now = warmed(delay_s=0.4)
+    assert heard(clock, now, 0.4) == pytest.approx(0.0, abs=0.01)
+    clock.sync(now, now + OFFSET - 0.4, now + OFFSET + 0.4)
+    assert heard(clock, now + 0.05, 0.4) == pytest.approx(0.4, abs=0.01)
+    assert clock.shortest_delay_s == pytest.approx(0.4, abs=0.01)
+    assert clock.round_trip_s == pytest.approx(0.8)
+
+
+@settings(deadline=None)
+@given(st.lists(st.floats(0.0, 0.5), min_size=1, max_size=60))
+def test_nothing_is_ever_younger_than_it_is_compared_with_the_quickest(delays):
+    clock = BoatClock()
+    for i, delay in enumerate(delays):
+        quickest = min(delays[: i + 1])
+        assert heard(clock, 10.0 + 5.0 * i, delay) == pytest.approx(delay - quickest, abs=5e-4 * (i + 1) + 1e-6)
+
+
+def test_a_drifting_clock_is_followed():
+    clock = BoatClock()
+    for i in range(20_000):
+        received = 0.1 * i * (1.0 + 5e-5) + OFFSET
+        assert received - clock.hear(0.1 * i, received) < 0.02
+
+
+def test_one_message_from_the_future_changes_nothing_and_a_restart_is_believed_when_enough_agree():
+    clock, now = warmed()
+    assert clock.hear(now + 3600.0, now + OFFSET) is None
+    assert heard(clock, now + 0.05, 0.02) == pytest.approx(0.0, abs=0.01)
+    assert clock.starts == 1
+    received = [now + OFFSET + 30.0 + 0.05 * i for i in range(BELIEVED_AFTER)]
+    answers = [clock.hear(1.0 + 0.05 * i, at) for i, at in enumerate(received)]
+    assert answers[:-1] == [None] * (BELIEVED_AFTER - 1)
+    assert answers[-1] == pytest.approx(received[-1], abs=0.01)
+    assert clock.starts == 2
+
+
+def test_a_clock_that_lost_time_is_noticed_by_the_round_trip():
+    clock, now = warmed()
+    clock.sync(now, now + OFFSET - 0.01, now + OFFSET + 0.01)
+    received = now + 80.0 + OFFSET
+    assert received - clock.hear(now, received) == pytest.approx(80.0, abs=0.1), "until then it looks late"
+    clock.sync(now, received - 0.001, received)
+    assert clock.starts == 2
+    assert received - clock.hear(now + 0.01, received + 0.01) < 0.1
+
+
+def test_answers_from_another_clock_or_nonsense_are_left():
+    clock, now = warmed()
+    for boat_s, sent_s, received_s in ((1e6, 0.0, 0.01), (math.nan, 0.0, 0.01), (0.0, 1.0, 0.0), (0.0, -60.0, 0.0)):
+        clock.sync(now + boat_s, now + OFFSET + sent_s, now + OFFSET + received_s)
+    assert clock.starts == 1
+    assert math.isnan(clock.round_trip_s)
+    assert heard(clock, now, 0.02) == pytest.approx(0.0, abs=0.01)

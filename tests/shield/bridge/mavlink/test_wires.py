@@ -35,6 +35,15 @@ def free_port(kind=socket.SOCK_STREAM):
         return probe.getsockname()[1]
 
 
+@contextlib.contextmanager
+def dialled():
+    """A server, and a wire of ours that has dialled it."""
+    server = socket.create_server(("127.0.0.1", 0))
+    with closing(server, TcpWire(Address("tcp", "127.0.0.1", server.getsockname()[1]))) as both:
+        both[1].open()
+        yield both
+
+
 @pytest.mark.parametrize(
     ("text", "address"),
     [
@@ -87,7 +96,7 @@ def test_udpout_to_nobody_waits_and_does_not_fail():
             assert wire.receive() is None
 
 
-def test_a_host_that_does_not_exist_is_said_so(monkeypatch):
+def test_a_host_that_does_not_exist_and_nobody_on_a_port_are_said_so(monkeypatch):
     def none(*args, **kwargs):
         raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
 
@@ -95,33 +104,26 @@ def test_a_host_that_does_not_exist_is_said_so(monkeypatch):
     for wire in (UdpWire(Address("udpout", "nowhere", 1)), TcpWire(Address("tcp", "nowhere", 1))):
         with pytest.raises(LinkError, match="no host 'nowhere'"):
             wire.open()
-
-
-def test_tcp_to_nobody_is_said_so():
+    monkeypatch.undo()
     with pytest.raises(LinkError, match="nothing listens there: start the boat"):
         TcpWire(Address("tcp", "127.0.0.1", free_port())).open()
 
 
 def test_tcp_lost_and_opened_again():
-    with closing(socket.socket()) as server, closing(TcpWire(Address("tcp", "127.0.0.1", 0))) as unused:
-        server.bind(("127.0.0.1", 0))
-        server.listen(2)
-        del unused
-        with closing(TcpWire(Address("tcp", "127.0.0.1", server.getsockname()[1]))) as wire:
-            wire.open()
-            boat, _ = server.accept()
-            boat.sendall(b"one")
-            assert received(wire)[0][0] == b"one"
-            boat.close()
-            with pytest.raises(ConnectionError):
-                received(wire)
-            assert wire.fileno() == -1
-            assert not wire.send(b"gone", None)
-            wire.open()
-            with closing(server.accept()[0]) as again:
-                assert wire.send(b"two", None)
-                again.settimeout(5.0)
-                assert again.recv(100) == b"two"
+    with dialled() as (server, wire):
+        boat, _ = server.accept()
+        boat.sendall(b"one")
+        assert received(wire)[0][0] == b"one"
+        boat.close()
+        with pytest.raises(ConnectionError):
+            received(wire)
+        assert wire.fileno() == -1
+        assert not wire.send(b"gone", None)
+        wire.open()
+        with closing(server.accept()[0]) as again:
+            assert wire.send(b"two", None)
+            again.settimeout(5.0)
+            assert again.recv(100) == b"two"
 
 
 def test_tcpin_takes_one_peer_and_the_next_after_it():
@@ -139,23 +141,17 @@ def test_tcpin_takes_one_peer_and_the_next_after_it():
 
 
 def test_a_peer_that_does_not_read_gets_whole_frames_or_none():
-    with closing(socket.socket()) as server:
-        server.bind(("127.0.0.1", 0))
-        server.listen(1)
-        with closing(TcpWire(Address("tcp", "127.0.0.1", server.getsockname()[1]))) as wire:
-            wire.open()
-            frame = bytes(range(256))
-            with closing(server.accept()[0]) as boat:
-                delivered = 0
-                while wire.send(frame, None):
-                    delivered += 1
-                assert not wire.send(frame, None), "full: said so, and not kept for later"
-                boat.settimeout(5.0)
-                data, size = b"", delivered * len(frame)
-                while len(data) < size:
-                    data += boat.recv(1 << 20)
-                    wire.send(b"", None)
-                assert data[:size] == frame * delivered
+    with dialled() as (server, wire), closing(server.accept()[0]) as boat:
+        frame, delivered = bytes(range(256)), 0
+        while wire.send(frame, None):
+            delivered += 1
+        assert not wire.send(frame, None), "full: said so, and not kept for later"
+        boat.settimeout(5.0)
+        data, size = b"", delivered * len(frame)
+        while len(data) < size:
+            data += boat.recv(1 << 20)
+            wire.send(b"", None)
+        assert data[:size] == frame * delivered
 
 
 def test_a_serial_port_carries_bytes_as_they_are():
@@ -175,14 +171,14 @@ def test_a_serial_port_carries_bytes_as_they_are():
 
 
 def test_serial_ports_that_are_none(tmp_path):
-    with pytest.raises(LinkError, match="no such device: plug it in"):
-        SerialWire(Address("serial", str(tmp_path / "none"), 57600)).open()
-    file = tmp_path / "file"
-    file.touch()
-    with pytest.raises(LinkError, match="that is no serial port"):
-        SerialWire(Address("serial", str(file), 57600)).open()
-    with pytest.raises(LinkError, match=r"no baud rate 12345; give one of .*57600"):
-        SerialWire(Address("serial", str(file), 12345)).open()
+    (tmp_path / "file").touch()
+    for name, baud, words in (
+        ("none", 57600, "no such device: plug it in"),
+        ("file", 57600, "that is no serial port"),
+        ("file", 12345, r"no baud rate 12345; give one of .*57600"),
+    ):
+        with pytest.raises(LinkError, match=words):
+            SerialWire(Address("serial", str(tmp_path / name), baud)).open()
 
 
 def test_a_serial_port_that_is_pulled_out_is_lost():

@@ -115,7 +115,7 @@ def read_of(make_link):
             )
         for mode, armed in MODES:
             boat.mode, boat.armed = mode, armed
-            time.sleep(0.25)
+            time.sleep(0.12)
             reading = link.read()
             found["heartbeat"].append([reading.mode, reading.ready, reading.released, reading.why_not.split(";")[0]])
         link.read()

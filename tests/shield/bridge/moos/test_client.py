@@ -12,7 +12,7 @@ import threading
 import time
 
 import pytest
-from moos_boats import until
+from moos_boats import free_ports, until
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.moos import client as client_module
 from steerclear.shield.bridge.moos.client import MoosClient
@@ -25,15 +25,8 @@ logging.getLogger("steerclear").setLevel(logging.ERROR)
 @contextlib.contextmanager
 def client_of(port, name="gate", variables=("A", "B"), warp=1.0, **more):
     heard = []
-    client = MoosClient(
-        name,
-        "127.0.0.1",
-        port,
-        MonotonicClock(warp),
-        variables,
-        lambda m, s: heard.append((m, s)),
-        **more,
-    )
+    clock = MonotonicClock(warp)
+    client = MoosClient(name, "127.0.0.1", port, clock, variables, lambda m, s: heard.append((m, s)), **more)
     client.start()
     try:
         yield client, heard
@@ -41,16 +34,11 @@ def client_of(port, name="gate", variables=("A", "B"), warp=1.0, **more):
         client.close()
 
 
-def free_port():
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        return server.getsockname()[1]
-
-
 @contextlib.contextmanager
 def real_db(warp=1.0):
     if shutil.which("MOOSDB") is None:
         pytest.skip("MOOSDB is not on the path; the stand-in is tested instead")
-    port = free_port()
+    (port,) = free_ports(1)
     arguments = ["MOOSDB", f"--moos_port={port}", "--moos_community=real", f"--moos_time_warp={warp:g}"]
     process = subprocess.Popen(arguments, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     time.sleep(1.0)
@@ -107,7 +95,7 @@ def test_a_second_client_of_the_name_is_told_and_gets_in_once_the_first_is_gone(
 
 
 def test_who_is_not_there_is_told_and_found_later():
-    port = free_port()
+    (port,) = free_ports(1)
     with client_of(port) as (client, heard):
         assert until(lambda: "start it, or correct the address" in client.health().fault)
         with StandInDb("alpha", port) as db:

@@ -15,7 +15,7 @@ from steerclear.shield.bridge.preflight_checks import run_checks
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import layout as L
 
-WARP = 2.0
+WARP = 4.0
 PRECBF = ("DESIRED_RUDDER_PRECBF", "DESIRED_THRUST_PRECBF")
 
 
@@ -39,11 +39,26 @@ def helms(boats, courses, speed_mps=1.2):
         thread.join()
 
 
+@contextlib.contextmanager
+def afloat():
+    """Simulated boats, the link to the one of ours, and its community."""
+    fleet = fleet_of(1, 0, gate="pid")
+    with sim_of(fleet, WARP) as boats, link_of(fleet, WARP) as (link, _):
+        yield boats, link, boats.boats["blue_1"].community
+
+
+def drive(link, community):
+    for _ in range(30):
+        link.send(1.0, 1.2)
+        time.sleep(0.1 / WARP)
+    assert community.actuators.thrust > 5.0
+
+
 def test_two_boats_head_on_keep_clear_behind_the_gate_after_the_pid():
     fleet = fleet_of(2, 0, gate="pid")
     with sim_of(fleet, WARP) as boats:
-        boats.place("blue_1", 20.0, 20.0, 90.0)
-        boats.place("blue_2", 44.0, 20.0, -90.0)
+        boats.place("blue_1", 24.0, 20.0, 90.0)
+        boats.place("blue_2", 42.0, 20.0, -90.0)
         y_axis_deg = fleet.field.y_axis_deg
         with helms(boats, {"blue_1": 90.0 + y_axis_deg, "blue_2": 270.0 + y_axis_deg}):
             aboard = boats.boats["blue_1"].community.db
@@ -58,60 +73,37 @@ def test_two_boats_head_on_keep_clear_behind_the_gate_after_the_pid():
         assert thrust.source == "steerclear_blue_1"
 
 
-def test_a_boat_that_is_left_has_no_thrust():
-    fleet = fleet_of(1, 0, gate="pid")
-    with sim_of(fleet, WARP) as boats:
-        with link_of(fleet, WARP) as (link, _):
-            for _ in range(30):
-                link.send(1.0, 1.2)
-                time.sleep(0.1 / WARP)
-            assert boats.states()["blue_1"][L.THRUST] > 5.0
-            assert "thrust" in link.close()
-        assert until(lambda: boats.boats["blue_1"].community.actuators.thrust == 0.0, 1.0)
-        assert until(lambda: boats.states()["blue_1"][L.SPEED] < 0.05, 10.0)
-
-
-def test_a_loop_that_hangs_leaves_no_thrust_behind():
-    fleet = fleet_of(1, 0, gate="pid")
-    with sim_of(fleet, WARP) as boats, link_of(fleet, WARP) as (link, _):
-        community = boats.boats["blue_1"].community
-        for _ in range(30):
-            link.send(1.0, 1.2)
-            time.sleep(0.1 / WARP)
-        assert community.actuators.thrust > 5.0
+def test_a_loop_that_hangs_leaves_no_thrust_behind_nor_does_a_boat_that_is_left():
+    with afloat() as (boats, link, community):
+        drive(link, community)
         assert until(lambda: community.actuators.thrust == 0.0, 2.0)
         assert "no command for 1 s" in " ".join(link.read().texts)
-        for _ in range(30):
-            link.send(1.0, 1.2)
-            time.sleep(0.1 / WARP)
-        assert community.actuators.thrust > 5.0  # and goes on with the next command
+        drive(link, community)  # and goes on with the next command
+        assert "thrust" in link.close()
+        assert until(lambda: community.actuators.thrust == 0.0, 1.0)
+        assert until(lambda: boats.states()["blue_1"][L.SPEED] < 0.05, 10.0)
 
 
 @pytest.mark.parametrize(
     ("key", "word"), [("MOOS_MANUAL_OVERRIDE", "true"), ("IVPHELM_ALLSTOP", "BehaviorError")], ids=["hand", "all-stop"]
 )
 def test_who_takes_a_boat_does_not_inherit_our_last_thrust(key, word):
-    fleet = fleet_of(1, 0, gate="pid")
-    with sim_of(fleet, WARP) as boats, link_of(fleet, WARP) as (link, _):
-        for _ in range(30):
-            link.send(1.0, 1.2)
-            time.sleep(0.1 / WARP)
-        assert boats.states()["blue_1"][L.THRUST] > 5.0
-        boats.boats["blue_1"].community.post(key, word, "somebody")
+    with afloat() as (_, link, community):
+        drive(link, community)
+        community.post(key, word, "somebody")
         assert until(lambda: not link.read().ready, 1.0)
         assert not link.send(1.0, 1.2).delivered  # decided just before it was heard
-        assert until(lambda: boats.boats["blue_1"].community.actuators.thrust == 0.0, 1.0)
-        boats.boats["blue_1"].community.post("DESIRED_THRUST", 20.0, "joystick")  # whose boat it is from now on
+        assert until(lambda: community.actuators.thrust == 0.0, 1.0)
+        community.post("DESIRED_THRUST", 20.0, "joystick")  # whose boat it is from now on
         time.sleep(0.5)
-        assert boats.boats["blue_1"].community.actuators.thrust == 20.0
+        assert community.actuators.thrust == 20.0
 
 
 def test_actuators_keep_what_they_were_told_and_take_no_number_that_is_none():
     with sim_of(fleet_of(1, 0, gate="pid"), WARP) as boats:
         community = boats.boats["blue_1"].community
-        community.post("DESIRED_THRUST", 40.0, "gate")
-        community.post("DESIRED_RUDDER", 10.0, "gate")
-        community.post("DESIRED_RUDDER", math.nan, "broken")
+        for key, value in (("DESIRED_THRUST", 40.0), ("DESIRED_RUDDER", 10.0), ("DESIRED_RUDDER", math.nan)):
+            community.post(key, value, "gate")
         assert (community.actuators.rudder, community.actuators.thrust) == (10.0, 40.0)
         assert until(lambda: boats.states()["blue_1"][L.SPEED] > 0.5)
 
@@ -134,8 +126,7 @@ def test_preflight_says_what_stops_a_boat_whose_gate_died(tmp_path, answer, simu
     mission.write_text("ProcessConfig = uSimMarine\n{\n}\n" if simulator else "")
     text = fleet_text(1, 0, gate="pid").replace("nothing_stops_it: true", f"{answer}, mission: {mission}")
     fleet = parse_fleet(text)
-    with sim_of(fleet) as boats, link_of(fleet) as (link, _):
-        assert boats
+    with sim_of(fleet), link_of(fleet) as (link, _):
         checks = [check for check in moos_checks({"blue_1": link}, fleet, 0.2) if check.name == "stop:blue_1"]
         (found,) = run_checks(checks)
     assert found.passed == passed
