@@ -43,7 +43,7 @@ class Rules(NamedTuple):
     tag_speed_frac: float
     tag_probability: float
     max_cycles: int  # decisions of a game
-    power_length: float  # of a power play, decisions
+    power_length: int  # of a power play, decisions
     shows_disabled: bool
     size: Array
     flag_home: Array
@@ -117,7 +117,7 @@ def make_rules(config: GameConfig, field: FieldGeometry) -> Rules:
         "corners": own_corners(field.size, 0.0),
         "corner_marks": own_corners(field.size, CORNER_INSET_M),
         "max_cycles": decisions,
-        "power_length": decisions * config.power_play_share,
+        "power_length": math.floor(decisions * config.power_play_share + 1e-9),
         "size": field.size,
         "flag_home": field.flag_home,
         "scrimmage": field.scrimmage,

@@ -1,8 +1,9 @@
 """Power plays: once in a game each team has a random boat disabled for a share of it.
 
-The two teams' power plays overlap only if `TRIES` draws find no room for both, as with shares near 0.5. As in the
-reference, a decision's number is the integer part of the game's accumulated time over the time of a decision. Rounding
-may repeat a number. A power play that begins at a repeated number begins twice, with another boat.
+A power play lasts a whole number of decisions, and the two teams' power plays never overlap. As in the reference, a
+decision's number is the integer part of the game's accumulated time over the time of a decision. Rounding may repeat or
+skip a number. A power play that begins at a repeated number begins twice, with another boat; one whose end is skipped
+never ends.
 """
 
 from __future__ import annotations
@@ -24,18 +25,18 @@ def _draw_below(games: Games, b: int, count: int) -> int:
 
 @lean_kernel
 def _draw_slots(rules: Rules, games: Games, b: int) -> tuple[int, int]:
-    """Draw two slots of ``power_length`` decisions: the first anywhere, the second in the rest, at 0 if none fits."""
-    length, first = rules.power_length, 0
+    """Draw two slots of ``power_length`` decisions: the first anywhere, the second in the rest.
+
+    If no draw leaves room for the second, they are the first and the last decisions.
+    """
+    last, length = rules.max_cycles - rules.power_length, rules.power_length
     for _ in range(TRIES):
-        first = _draw_below(games, b, int(rules.max_cycles - length) + 1)
-        before = 0 if first < length else int(first - length)
-        after = 0
-        if first + length < rules.max_cycles:
-            after = max(0, int(rules.max_cycles - length) - int(first + length))
+        first = _draw_below(games, b, last + 1)
+        before, after = max(0, first - length), max(0, last - first - length)
         if before + after > 0:
             drawn = _draw_below(games, b, before + after)
-            return first, drawn if drawn < before else int(first + length) + drawn - before
-    return first, 0
+            return first, drawn if drawn < before else first + length + drawn - before
+    return 0, last
 
 
 @lean_kernel
@@ -44,7 +45,7 @@ def plan_power_plays(rules: Rules, games: Games, b: int) -> None:
     for team in range(2):
         games.power_start[b, team] = -1
         games.power_begun[b, team] = 0
-    if not rules.power_length > 0.0:
+    if rules.power_length == 0:
         return
     one, two = _draw_slots(rules, games, b)
     swap = next_uniform(games.rng, b) < 0.5
@@ -58,7 +59,7 @@ def plan_power_plays(rules: Rules, games: Games, b: int) -> None:
 @lean_kernel
 def toggle_power_plays(rules: Rules, games: Games) -> None:
     """Begin and end power plays. Call this before anything else in a decision."""
-    if not rules.power_length > 0.0:
+    if rules.power_length == 0:
         return
     for b in range(games.state.shape[0]):
         cycle = int(games.time_s[b] / rules.decision_s)

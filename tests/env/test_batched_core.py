@@ -83,32 +83,6 @@ def test_resetting_some_games_leaves_the_others_alone():
     np.testing.assert_array_equal(core.state, first)
 
 
-def test_a_filter_stands_between_decision_and_motion(place):
-    core = place({0: (50.0, 30.0)}, is_tagged={"agent_0": True})
-    seen = []
-
-    def stop_everybody(games, commands):
-        seen.append((games is core, commands.copy(), games.driven.copy()))
-        return np.zeros_like(commands)
-
-    before = core.state[0, :, :2].copy()
-    core.step(np.full((1, 4, 2), 5.0), stop_everybody)
-    np.testing.assert_array_equal(core.state[0, :, :2], before)
-    (same, commands, driven), *_ = seen
-    assert same
-    assert driven[0].tolist() == [True, False, False, False]
-    assert commands[0, 0, 0] == 10.0
-
-
-def test_step_is_commands_then_advance():
-    one, two = BatchedMctf(RANDOM, 3, seed=2), BatchedMctf(RANDOM, 3, seed=2)
-    for t in range(20):
-        actions = random_actions(t, 3, 4)
-        one.step(actions)
-        two.advance(two.commands(actions))
-    np.testing.assert_array_equal(one.state, two.state)
-
-
 @pytest.mark.parametrize(
     ("actions", "message"),
     [
@@ -160,19 +134,6 @@ def test_rewards_weigh_the_events_of_both_teams(place, hold):
     core.state[0, 1, :2] = (60.0, 39.0)
     _, rewards, _, _ = hold(core)
     assert rewards[0].tolist() == [0.125, 0.125 - 2.0, -0.125, -0.125 - 2.0]
-
-
-def test_views_are_frozen_copies(place, hold):
-    core = place()
-    view = core.view()
-    np.testing.assert_array_equal(view.position, core.state[0, :, :2])
-    kept = view.state.copy()
-    core.step(np.full((1, 4, 2), 3.0))
-    np.testing.assert_array_equal(view.state, kept)
-    with pytest.raises(AttributeError):
-        view.time_s = 3.0
-    assert (view.time_s, view.terminated, view.truncated) == (0.0, False, False)
-    assert view.heading_deg.shape == view.speed_mps.shape == (4,)
 
 
 def test_four_thousand_games_stay_small():

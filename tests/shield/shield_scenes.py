@@ -40,6 +40,16 @@ def head_on(gap_m=12.0, platforms="heron", speed=2.0, aside_m=0.0):
     return fleet_of([(0.0, 0.0, 0.0, speed), (aside_m, gap_m, 180.0, speed)], [0, 1], platforms)
 
 
+def crowded_edge(random, x_m):
+    """A few boats anyhow at an upper edge at 80 m, with an opponent or without: rows, teams, courses."""
+    own, opponents = int(random.integers(2, 6)), int(random.integers(0, 2))
+    rows = [
+        (x_m + random.uniform(-9.0, 9.0), random.uniform(62.0, 79.9), random.uniform(-180, 180), random.uniform(0, 2))
+        for _ in range(own + opponents)
+    ]
+    return rows, [0] * own + [1] * opponents, list(random.uniform(-180.0, 180.0, own + opponents))
+
+
 @st.composite
 def fleets(draw, most=5, spread_m=20.0, kinds=BOATS, least=1):
     """Fleets of 1 to ``most`` boats of any kinds, near one another or on one point, some of them ours."""

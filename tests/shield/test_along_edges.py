@@ -2,15 +2,18 @@
 
 import numpy as np
 import pytest
-from shield_loops import sail_games, scattered
+from shield_loops import Wander, sail_games, scattered
 from steerclear.shield import ShieldConfig, Surroundings
 from steerclear.shield.backup.paths import SAG_M
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
 
 STEPS, SETTLED, GAMES = 900, 500, 12
+
 COURSE = np.linspace(-180.0, 150.0, GAMES)
+
 FIELD = (0.0, 0.0, 160.0, 80.0)
+
 EDGE_M, HULL_M = 0.2, 1.0
 
 
@@ -53,29 +56,6 @@ def test_along_the_edge_of_the_field(platform, share):
     assert inside.min() >= EDGE_M - SAG_M - 1e-3
     assert np.median(flips_per_min(turns[SETTLED:])) < 60.0
     assert np.mean(speed[SETTLED:]) > share * get_platform(platform).max_speed_mps
-
-
-@pytest.mark.parametrize(("platform", "share"), [("heron", 0.9), ("surveyor", 0.6)])
-def test_what_one_boat_cannot_do_does_not_make_others_weave(platform, share):
-    """Three boats far apart, each at an edge of its own."""
-    top, games = get_platform(platform).max_speed_mps, 6
-    state = scattered(np.random.default_rng(7), games, [platform] * 3, 1.0, gap_m=0.0, speed=(0.3, 1.0))
-    places = np.array([[0.0, 270.0], [270.0, 0.0], [0.0, -270.0]])
-    state[..., :2] = places + np.random.default_rng(8).uniform(-8.0, 8.0, (games, 3, 2))
-    outwards, headings, speeds = np.array([10.0, 80.0, 170.0]), [], []
-
-    def wanted(step, state):
-        headings.append(state[..., L.HEADING].copy())
-        speeds.append(state[..., L.SPEED].copy())
-        error = (outwards - state[..., L.HEADING] + 180.0) % 360.0 - 180.0
-        return np.stack([np.full(error.shape, top), error], axis=-1)
-
-    around = Surroundings(field=(-300.0, -300.0, 300.0, 300.0))
-    run = sail_games(ShieldConfig(edge_m=EDGE_M), state, [platform] * 3, [0] * 3, wanted, 700, surroundings=around)
-    assert np.abs(run.position).max() <= 300.0 - EDGE_M + 2.0 * SAG_M
-    turns = (np.diff(headings, axis=0) + 180.0) % 360.0 - 180.0
-    assert np.median(flips_per_min(turns[300:])) < 60.0
-    assert np.mean(speeds[300:]) > share * top
 
 
 @pytest.mark.parametrize(("platform", "share"), [("heron", 0.9), ("surveyor", 0.9)])
@@ -134,3 +114,55 @@ def test_a_boat_far_beyond_the_field_heads_home(platform, beyond_m):
     around = Surroundings(field=FIELD)
     position, _, _ = press(platform, start, lambda boats: np.zeros(len(boats)), around, steps=450)
     assert (position[0, :, 1] - position[-1, :, 1]).min() > 50.0
+
+
+CORNER = np.array([160.0, 0.0])
+
+CORNER_GAMES = 96
+
+
+def press_into_the_corner(platform, boats):
+    """Positions (T+1, CORNER_GAMES, boats, 2) m of boats that steer for the corner at top speed."""
+    side_m, gap_m = (20.0, 4.0) if platform == "heron" else (40.0, 15.0)
+    state = scattered(np.random.default_rng(1), CORNER_GAMES, [platform] * boats, side_m, gap_m=gap_m, speed=(0.3, 1.0))
+    state[..., :2] += (115.0, 15.0)
+    top = get_platform(platform).max_speed_mps
+
+    def wanted(step, state):
+        east, north = np.moveaxis(CORNER - state[..., :2], -1, 0)
+        error = (np.degrees(np.arctan2(east, north)) - state[..., L.HEADING] + 180.0) % 360.0 - 180.0
+        return np.stack([np.full(error.shape, top), error], axis=-1)
+
+    around = Surroundings(field=FIELD)
+    run = sail_games(ShieldConfig(), state, [platform] * boats, [0] * boats, wanted, 650, surroundings=around)
+    return run.position, run.closest(np.ones(boats, bool))
+
+
+@pytest.mark.parametrize(("platform", "boats"), [("heron", 2), ("heron", 3), ("surveyor", 3)])
+def test_boats_that_press_into_one_corner(platform, boats):
+    """Where nothing but a turn towards a mate is left they give way beyond the edge, in few games and not far."""
+    position, closest_m = press_into_the_corner(platform, boats)
+    assert closest_m.min() >= 2.5
+    inside_m = np.minimum(position - FIELD[:2], np.array(FIELD[2:]) - position).min(axis=(0, 2, 3))
+    assert (inside_m < (-1.0 if platform == "heron" else -1.5)).mean() <= 0.04
+    assert inside_m.min() >= -2.0
+    assert (inside_m < 0.0).mean() <= (0.03 if platform == "heron" else 0.1)
+    reached_m = np.linalg.norm(position - CORNER, axis=-1).min(axis=(0, 2))
+    assert reached_m.max() < 5.0, "in some game nobody came to the corner"
+
+
+@pytest.mark.parametrize(
+    ("platform", "boats", "side_m", "gap_m"), [("heron", 6, 40.0, 6.0), ("surveyor", 4, 60.0, 12.0)]
+)
+def test_boats_that_wander_about_a_small_field(platform, boats, side_m, gap_m):
+    random = np.random.default_rng(12)
+    state = scattered(random, 20, [platform] * boats, side_m - 12.0, gap_m=gap_m, speed=(0.0, 0.5))
+    state[..., :2] += 6.0
+    wanted = Wander(12, 20, [platform] * boats, hold_s=4.0)
+    around = Surroundings(field=(0.0, 0.0, side_m, side_m))
+    run = sail_games(ShieldConfig(), state, [platform] * boats, [0] * boats, wanted, 500, surroundings=around)
+    assert run.closest(np.ones(boats, bool)).min() >= 2.5
+    inside_m = np.minimum(run.position, side_m - run.position).min(axis=(0, 2, 3))
+    assert (inside_m >= 0.0).mean() >= 0.95
+    assert inside_m.min() >= -0.5
+    assert (run.reason > 0).mean() < 0.25

@@ -10,7 +10,6 @@ from steerclear.experiments.entries.onboard.state import GameSpec, Observation, 
 from steerclear.experiments.entries.package import game_spec
 from steerclear.shield import Commands, Fleet, Shield, ShieldConfig
 from steerclear.shield.batch import BatchedShield
-from steerclear.shield.exceptions import FleetError
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.wrappers import games_shield
 from steerclear.shield.wrappers.driving import driven_boats
@@ -127,10 +126,3 @@ def test_who_is_sure_to_lie_still_is_not_feared_as_who_may_come_near():
     assert crossing(shield, None) == feared  # nothing of it is left
     driven[0, 1, 3] = 1.0  # not for long enough to count on
     assert crossing(shield, driven) == feared
-
-
-def test_rows_of_another_shape_are_refused():
-    core = games("aamas2024")
-    shield = games_shield(core)
-    with pytest.raises(FleetError, match="driven"):
-        shield.decide(core.state, np.zeros((GAMES, 6, 2)), core.team == np.zeros((GAMES, 6)), driven=np.zeros((6, 4)))

@@ -1,44 +1,27 @@
 """Boats under the shield, sailed on: the distance is kept wherever the certificate says it can be."""
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import qpsolvers
-from shield_loops import packed, sail, sail_games
-from shield_scenes import distances, fleet_of, head_on
-from steerclear.shield import Commands, Fleet, Shield, ShieldConfig, Surroundings
-from steerclear.shield.platforms import fresh_state, get_platform, step_boat
+from shield_loops import Wander, packed, sail, sail_games, scattered, step_all
+from shield_scenes import SEEN, distances, fleet_of
+from steerclear.shield import Commands, Fleet, Reason, Shield, ShieldConfig, Surroundings
+from steerclear.shield.batch import BatchedShield
+from steerclear.shield.decision import SOLVERS
+from steerclear.shield.platforms import get_platform, step_boat
 from steerclear.shield.platforms import layout as L
 
 GAMES = 24
+
 STEPS_S = 20.0
 
 
-def starts(platform, n, spread_m, seed):
-    """Random states, (GAMES, n, N_STATE), no two boats nearer than 8 m."""
-    rng = np.random.default_rng(seed)
-    top = get_platform(platform).max_speed_mps
-    games = []
-    while len(games) < GAMES:
-        place = rng.uniform(-spread_m, spread_m, (n, 2))
-        gap = np.linalg.norm(place[:, None] - place[None], axis=2) + 99 * np.eye(n)
-        if gap.min() > 8:
-            games.append([fresh_state(x, y, rng.uniform(-180, 180), rng.uniform(0, top)) for x, y in place])
-    return np.array(games)
-
-
-def wander(platform, n, seed):
-    """Random commands, new every second or so."""
-    rng = np.random.default_rng(seed)
-    top = get_platform(platform).max_speed_mps
-    held = np.zeros((GAMES, n, 2))
-
-    def wanted(step, state):
-        if step % 10 == 0:
-            held[..., 0] = rng.uniform(0.3 * top, top, (GAMES, n))
-            held[..., 1] = rng.uniform(-120, 120, (GAMES, n))
-        return held.copy()
-
-    return wanted
+def begun(platform, spread_m, seed):
+    """States of three boats, (GAMES, 3, N_STATE), no two nearer than 8 m."""
+    return scattered(np.random.default_rng(seed), GAMES, [platform] * 3, 2.0 * spread_m, gap_m=8.0)
 
 
 @pytest.mark.parametrize("dt_s", [0.1, 0.05])
@@ -46,8 +29,15 @@ def wander(platform, n, seed):
 @pytest.mark.parametrize("certificate", ["turning_circle", "value_table"])
 def test_team_mates_never_come_too_near(certificate, platform, spread_m, dt_s):
     config = ShieldConfig(dt_s=dt_s, opponent_model=certificate)
-    state = starts(platform, 3, spread_m, 3)
-    run = sail_games(config, state, [platform] * 3, [0, 0, 0], wander(platform, 3, 4), int(STEPS_S / dt_s))
+    state = begun(platform, spread_m, 3)
+    run = sail_games(
+        config,
+        state,
+        [platform] * 3,
+        [0, 0, 0],
+        Wander(4, GAMES, [platform] * 3, 1.0, dt_s, slowest=0.3),
+        int(STEPS_S / dt_s),
+    )
     certified = (run.safety_margin_m[0] >= 0).all(axis=-1)
     assert certified.sum() >= GAMES // 3
     assert run.closest(np.ones(3, bool))[certified].min() >= config.separation_m
@@ -57,12 +47,12 @@ def test_team_mates_never_come_too_near(certificate, platform, spread_m, dt_s):
 @pytest.mark.parametrize(("platform", "spread_m"), [("heron", 12), ("surveyor", 30), ("si", 60)])
 def test_opponents_that_hold_their_course_are_avoided(platform, spread_m, dt_s):
     config = ShieldConfig(dt_s=dt_s, adversary_horizon_s=0.0)
-    state = starts(platform, 3, spread_m, 5)
+    state = begun(platform, spread_m, 5)
     top = get_platform(platform).max_speed_mps
     state[:, :, L.SPEED] = top
     thrust = np.interp(top, *np.array(get_platform(platform).thrust_map).T[::-1])
     state[:, :, L.THRUST] = thrust
-    random = wander(platform, 3, 6)
+    random = Wander(6, GAMES, [platform] * 3, 1.0, dt_s, slowest=0.3)
 
     def wanted(step, now):
         commands = random(step, now)
@@ -73,13 +63,6 @@ def test_opponents_that_hold_their_course_are_avoided(platform, spread_m, dt_s):
     certified = run.safety_margin_m[0][:, 0] >= 0
     assert certified.sum() >= GAMES // 3
     assert run.closest(np.array([True, False, False]))[certified].min() >= config.separation_m
-
-
-def test_a_side_once_taken_is_kept():
-    run = sail(Shield(), head_on(12.0, aside_m=0.05), lambda step, state: np.array([[2.0, 0.0], [2.0, 0.0]]), 60)
-    east = run.position[:, 0, 0]
-    assert distances(run.position)[:, 0, 1].min() >= 2.5
-    assert (np.diff(east) >= -1e-6).all() or (np.diff(east) <= 1e-6).all() or np.ptp(np.sign(np.round(east, 2))) <= 1
 
 
 @pytest.mark.parametrize("start_y", [18.2, 18.5])
@@ -117,47 +100,6 @@ def test_a_boat_sent_out_for_ever_stays_in_by_absolute_headings(name, around):
     assert 79.0 < highest < 80.0
 
 
-def test_a_command_changed_for_an_edge_alone_says_so():
-    fleet = fleet_of([(40, 79.78, 85, 1.5), (40, -500, 0, 1.5)], [0, 0])
-    decisions = Shield(surroundings=Surroundings(field=(0, -600, 80, 80))).decide(
-        fleet, Commands.relative_deg([[2.0, -85.0], [1.5, 0.0]])
-    )
-    assert list(decisions.intervened) == [True, False]
-    assert [each.active_constraints for each in decisions] == [("field",), ()]
-
-
-@pytest.mark.parametrize("name", ["heron", "surveyor"])
-@pytest.mark.parametrize("goal_deg", [0.0, 180.0])
-def test_a_boat_outside_the_field_comes_back_whatever_is_wanted(name, goal_deg):
-    """At rest 3 m out with its bow outwards it has to go farther out to turn: staying there is not better."""
-    fleet = fleet_of([(40, 43, 0, 0.0)], [0], name)
-    run = sail(
-        Shield(surroundings=Surroundings(field=(0, 0, 80, 40))),
-        fleet,
-        lambda step, state: np.array([[2.0, goal_deg - state[0, L.HEADING]]]),
-        400,
-    )
-    north = run.position[:, 0, 1]
-    assert north.max() < 45.0
-    assert (north[300:] < 40.0).all()
-
-
-def test_a_boat_that_cannot_keep_off_a_circle_any_more_hardly_goes_into_it():
-    fleet = fleet_of([(0.3, 6.4, 0, 2)], [0])
-    run = sail(Shield(surroundings=Surroundings(circles=[(0, 10, 3)])), fleet, lambda *_: np.array([[2.0, 0.0]]), 60)
-    assert np.linalg.norm(run.position[:, 0] - [0, 10], axis=1).min() > 2.6
-
-
-def test_one_boat_alone_stays_in_the_field_and_off_the_obstacle():
-    around = Surroundings(field=(0, 0, 40, 40), circles=[(20, 30, 2)])
-    fleet = fleet_of([(20, 10, 0, 2)], [0])
-    run = sail(Shield(surroundings=around), fleet, lambda step, state: np.array([[2.0, 0.0]]), 400)
-    place = run.position[:, 0]
-    assert place.min() > 0
-    assert place.max() < 40
-    assert np.linalg.norm(place - [20, 30], axis=1).min() >= 2.0
-
-
 def answers_nonsense(*arguments, **settings):
     return np.full(4, np.nan)
 
@@ -177,3 +119,96 @@ def test_boats_keep_apart_when_the_solver_fails(solver, monkeypatch):
     run = sail(Shield(), fleet, lambda step, state: np.array([[2.0, 0.0], [2.0, 0.0]]), 100)
     assert distances(run.position)[:, 0, 1].min() >= 2.5
     assert np.isfinite(run.sent).all()
+
+
+def herons(seed, side_m, gap_m, speed, turn_deg, steps):
+    """Six herons of ours with wants of their own, and how they sail."""
+    random = np.random.default_rng(seed)
+    state = scattered(random, 1, ["heron"] * 6, side_m, gap_m=gap_m, speed=(0.0, 1.0))[0]
+    wants = np.column_stack([random.uniform(*speed, 6), random.uniform(-turn_deg, turn_deg, 6)])
+    return wants, sail(Shield(), fleet_of(state[:, SEEN], [0] * 6), lambda _step, _state: wants, steps)
+
+
+def test_answers_are_sent_between_team_mates_and_none_comes_too_near():
+    answered = 0
+    for seed in range(40):
+        wants, run = herons(seed, 24.0, 4.0, (0.5, 2.0), 20.0, 80)
+        by_program = run.solver == SOLVERS.index("qp")
+        assert (run.reason[by_program] == Reason.LEAST_CHANGE).all()
+        answered += by_program.sum()
+        assert (run.safety_margin_m[by_program] >= 0.0).all()
+        assert (np.abs(run.sent - wants).max(axis=-1)[by_program] > 0.0).all()
+    assert answered > 5
+
+
+def test_who_is_sent_what_it_wants_is_told_so():
+    """No nominal command sent bit for bit is said to be changed."""
+    backed_up = blended = 0
+    for seed in range(40):
+        wants, run = herons(seed, 20.0, 3.0, (0.5, 2.0), 60.0, 60)
+        on_backup = (run.reason == Reason.BACKUP) | (run.reason == Reason.LEAST_CHANGE)
+        backed_up += on_backup.sum()
+        blended += ((run.reason == Reason.LEAST_CHANGE) & (run.solver == SOLVERS.index("line_search"))).sum()
+        assert (np.abs(run.sent - wants).max(axis=-1)[on_backup] > 1e-6).all()
+    assert backed_up > 100
+    assert blended > 10
+
+
+def test_two_side_by_side_do_not_let_a_line_of_opponents_come_up():
+    """Boats of ours abeam of each other, told to hold on, and three opponents abreast that steer for them."""
+    games, team = 8, (0, 0, 1, 1, 1)
+    random, state = np.random.default_rng(3), np.zeros((8, 5, L.N_STATE))
+    for game in state:
+        aside = random.uniform(-6.0, 6.0)
+        game[:, L.X] = [0.0, 2.9, aside - 6.0, aside, aside + 6.0]
+        game[2:, L.Y], game[2:, L.HEADING] = random.uniform(42.0, 55.0), -180.0
+        game[:2, L.SPEED], game[2:, L.SPEED] = random.uniform(1.6, 3.0), 2.0
+        game[:, L.THRUST] = 100.0
+    shield = BatchedShield(ShieldConfig(), games, ("surveyor",) * 5, team)
+    ours, closest = np.tile(np.array(team) == 0, (games, 1)), np.full(games, math.inf)
+    for _ in range(350):
+        wanted = np.full((games, 5, 2), [3.0, 0.0])
+        way = state[:, :1, :2] - state[:, 2:, :2]
+        bearing = np.degrees(np.arctan2(way[..., 0], way[..., 1]))
+        wanted[:, 2:, 1] = (bearing - state[:, 2:, L.HEADING] + 180.0) % 360.0 - 180.0
+        step_all(packed(["surveyor"] * 5), state, shield.decide(state, wanted, ours), 0.1)
+        gaps = np.linalg.norm(state[:, :2, None, :2] - state[:, None, 2:, :2], axis=-1)
+        closest = np.minimum(closest, gaps.min(axis=(1, 2)))
+    assert (closest >= 2.5).all()
+
+
+BOATS, STEPS = 5, 150
+
+
+def other_autopilot(kind, kp=1.0, kd=1.0):
+    """The platform's row with the gains of its heading controller times these."""
+    pid = kind.heading_pid
+    return replace(kind, heading_pid=replace(pid, kp=kp * pid.kp, kd=kd * pid.kd)).pack()
+
+
+def closest(name, seed, **gains):
+    """Closest distance, m, of a crowd."""
+    random, kinds = np.random.default_rng(seed), (name,) * BOATS
+    state = scattered(random, 1, kinds, 16.0 if name == "heron" else 40.0)[0]
+    params = np.array([other_autopilot(get_platform(name), **gains)] * BOATS)
+    shield, wander, nearest = Shield(), Wander(seed, 1, kinds), np.inf
+    for step in range(STEPS):
+        fleet = Fleet.of(
+            position_m=state[:, : L.Y + 1],
+            heading_rad=np.radians(state[:, L.HEADING]),
+            speed_mps=state[:, L.SPEED],
+            team=[0] * BOATS,
+            platforms=name,
+        )
+        wanted = wander(step, state[None])[0]
+        course = np.radians(state[:, L.HEADING] + wanted[:, 1])
+        sent = shield.decide(fleet, Commands.absolute_rad(np.stack([wanted[:, 0], course], axis=1))).filtered
+        step_all(params, state[None], sent.as_relative_deg(state[:, L.HEADING])[None], 0.1)
+        nearest = min(nearest, distances(state[:, : L.Y + 1]).min())
+    return nearest
+
+
+@pytest.mark.parametrize("gains", [{}, {"kd": 0.5}, {"kd": 0.0}, {"kp": 2.2, "kd": 0.0}])
+def test_boats_behind_another_autopilot_keep_their_distance(gains):
+    """Believed without proof, the model's memory let boats without a derivative come within 2.1 m of each other."""
+    assert min(closest("heron", seed, **gains) for seed in range(6)) >= 2.5

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shield_scenes import bits, fleet_of
-from steerclear.shield import Commands, Fleet, Reason, Shield, ShieldConfig, arrays
-from steerclear.shield.batch import BatchedShield
+from steerclear.shield import Commands, Fleet, Reason, Shield, arrays
 from steerclear.shield.exceptions import FleetError
 
 quick = settings(max_examples=100, deadline=None, derandomize=True)
@@ -43,33 +42,6 @@ def test_absolute_and_relative_say_the_same(pairs, data):
         assert own[0] == other[0] == pairs[i][0]
         assert apart_rad(own[1], other[1]) < 1e-9
         assert 0.0 <= own[1] <= 2.0 * math.pi
-
-
-@quick
-@given(PAIRS, st.data())
-def test_replacing_rows_keeps_the_others_bit_for_bit(pairs, data):
-    n = len(pairs)
-    changed = np.array(data.draw(st.lists(st.booleans(), min_size=n, max_size=n)))
-    heading = np.array(data.draw(st.lists(st.floats(-180.0, 180.0), min_size=n, max_size=n)))
-    new = np.column_stack([np.full(n, 1.25), np.linspace(-170.0, 170.0, n)])
-    for commands in (Commands.relative_deg(pairs), Commands.absolute_rad(pairs)):
-        before = bits(commands.values)
-        replaced = commands.replaced(changed, new, heading)
-        assert bits(commands.values) == before
-        assert replaced.relative == commands.relative
-        assert bits(replaced.values[~changed]) == bits(commands.values[~changed])
-        told = replaced.as_relative_deg(heading)[changed]
-        assert told[:, 0].tolist() == [1.25] * int(changed.sum())
-        assert all(abs(math.remainder(a - b, 360.0)) < 1e-9 for a, b in zip(told[:, 1], new[changed, 1], strict=True))
-
-
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, 1.1e6, -1.1e6, 1e15, 1.7e308])
-def test_headings_that_are_none_stay_none_without_a_warning(value):
-    commands = Commands.absolute_rad([[1.0, value], [value, 1.0]])
-    relative = commands.as_relative_deg(np.zeros(2))
-    assert math.isnan(relative[0, 1])
-    assert math.degrees(1.0) == pytest.approx(relative[1, 1])
-    assert math.isfinite(commands.absolute(0, 0.0)[1]) == math.isfinite(value)
 
 
 def test_commands_are_a_copy_of_what_was_given_and_degrees_are_kept_in_rad():
@@ -139,43 +111,6 @@ def test_the_limits_themselves_pass_bit_for_bit(speed):
     decisions = Shield().decide(fleet_of(ALONE, (0, 0)), wanted)
     assert bits(decisions.filtered.values) == bits(wanted.values)
     assert decisions.reason.tolist() == [Reason.PASSED] * 2
-
-
-@pytest.mark.parametrize("make", [Commands.relative_deg, Commands.absolute_rad, Commands.absolute_deg])
-@pytest.mark.parametrize(
-    ("speed", "heading"), [(math.nan, 0.5), (math.inf, 0.5), (2e6, 0.5), (-2e6, 0.5), (9.0, math.nan), (9.0, math.inf)]
-)
-def test_what_is_no_command_is_held(make, speed, heading):
-    first = decide([[speed, heading], [1.0, 0.25]], make)[0]
-    assert (first.reason, first.filtered_speed_mps) == (Reason.HELD, 0.0)
-
-
-def test_a_cut_command_that_is_not_safe_is_changed_for_that():
-    meeting = fleet_of([(0, 0, 0.0, 2.0), (0, 5.5, 180.0, 2.0)], (0, 1))
-    cut, plain = (
-        Shield().decide(meeting, Commands.absolute_rad([[speed, 0.0], [2.0, math.pi]]))[0] for speed in (7.0, 2.0)
-    )
-    assert cut.reason == plain.reason != Reason.LIMITED
-    assert (cut.filtered_speed_mps, cut.filtered_heading_rad) == (plain.filtered_speed_mps, plain.filtered_heading_rad)
-
-
-def test_both_ways_of_deciding_keep_the_limits_of_own_boats_and_leave_others_alone():
-    shield = Shield(coordination="per_boat")
-    decisions = shield.decide(fleet_of(ALONE, (0, 0)), Commands.absolute_rad([[5.0, 0.5], [-1.0, 0.0]]))
-    assert decisions.filtered.values[:, 0].tolist() == [2.0, 0.0]
-    decisions = decide([[9.0, 0.5], [9.0, 0.25]], Commands.absolute_rad, team=(0, 1))
-    assert decisions.reason.tolist() == [Reason.LIMITED, Reason.NOT_COVERED]
-    assert decisions.filtered.values[:, 0].tolist() == [2.0, 9.0]
-
-
-def test_commands_of_a_game_pass_as_they_are():
-    wanted = Commands.game_deg([[7.0, 20.0], [-1.0, 0.0]])
-    decisions = Shield().decide(fleet_of(ALONE, (0, 0)), wanted)
-    assert bits(decisions.filtered.values) == bits(wanted.values)
-    assert decisions.reason.tolist() == [Reason.PASSED] * 2
-    batch = BatchedShield(ShieldConfig(), 1, ("heron", "heron"), (0, 0))
-    state = np.nan_to_num(fleet_of(ALONE, (0, 0)).state[None])
-    assert bits(batch.decide(state, wanted.values[None], np.ones((1, 2), bool))[0]) == bits(wanted.values)
 
 
 def seen(**changes):

@@ -5,7 +5,6 @@ import pytest
 from shield_loops import packed, step_all
 from steerclear.shield import ShieldConfig, Surroundings
 from steerclear.shield.batch import BatchedShield
-from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import layout as L
 
 GAMES, STEPS, CURRENT_MPS, RADIUS = 12, 250, 0.3, 4.0
@@ -69,14 +68,3 @@ def test_fixed_things_are_widened_by_the_drift_until_a_command_acts():
     np.testing.assert_allclose(told.circles[:, 2] - still.circles[:, 2], 0.9)
     np.testing.assert_allclose(told.keep_out[:, 2] - still.keep_out[:, 2], 0.9)
     assert (still.current_mps, told.current_mps) == (0.0, 0.6)
-
-
-def test_a_current_that_leaves_nothing_of_the_field_is_refused():
-    with pytest.raises(ConfigError, match="smaller edge_m, position_error_m or current_mps"):
-        Surroundings((0.0, 0.0, 80.0, 1.0)).pack(ShieldConfig(current_mps=3.0))
-
-
-@pytest.mark.parametrize("value", [-0.1, float("nan"), float("inf"), "0.3"])
-def test_a_current_that_is_no_speed_is_refused(value):
-    with pytest.raises(ConfigError, match="current_mps is"):
-        ShieldConfig(current_mps=value)

@@ -11,8 +11,6 @@ from shield_scenes import bits, fleet_of, relative
 from steerclear.shield import Reason, Shield, ShieldConfig, Surroundings
 from steerclear.shield.batch import BatchedShield
 from steerclear.shield.commands import Commands
-from steerclear.shield.exceptions import ConfigError
-from steerclear.shield.workspace import OURS
 
 TEAM = (0, 0, 0, 1, 1)
 
@@ -51,7 +49,7 @@ def test_a_single_decision_is_a_batch_of_one_bit_for_bit(delay_s):
     assert changed > 20
 
 
-@pytest.mark.parametrize("threads", [2, 3, 9])
+@pytest.mark.parametrize("threads", [2, 9])
 def test_threads_share_the_games_of_a_batch_and_another_goes_on_from_what_it_remembered(threads):
     """Without what is remembered the same states and commands are decided otherwise, so it does matter."""
     config, otherwise = ShieldConfig(delay_s=0.2), 0
@@ -79,54 +77,11 @@ def test_threads_share_the_games_of_a_batch_and_another_goes_on_from_what_it_rem
     assert otherwise > 0
 
 
-@pytest.mark.parametrize("threads", [0, -1, 1.5, True, None])
-def test_no_number_of_threads_is_refused(threads):
-    with pytest.raises(ConfigError, match=r"threads is .*; give a whole number >= 1"):
-        BatchedShield(ShieldConfig(), 2, ("heron",) * 5, TEAM, threads=threads)
-    with pytest.raises(ConfigError, match="coordination='team'"):
-        BatchedShield(ShieldConfig(coordination="per_boat"), 1, ("heron",), (0,))
-
-
-def test_boats_that_are_not_ours_decide_nothing_and_are_feared_alike():
-    shields = [Shield(coordination=coordination) for coordination in ("team", "per_boat")]
-    team, each = (shield.decide(crowd(3), relative(*[(2.0, 10.0)] * 5)) for shield in shields)
-    np.testing.assert_array_equal(team.adversary_horizon_s, each.adversary_horizon_s)
-    assert np.isnan(team.adversary_horizon_s[:3]).all()
-    assert (team.adversary_horizon_s[3:] > 0.0).all()
-    assert (shields[1]._deciders.scene.given[:, :, OURS] != 0.0).any(axis=1).tolist() == [
-        True,
-        True,
-        True,
-        False,
-        False,
-    ]
-    assert (each.reason[3:] == Reason.NOT_COVERED).all()
-
-
 @pytest.mark.parametrize("teams", [(0, 1, -1), (-1, 1, 1)])
 def test_whoever_is_of_no_team_of_ours_is_feared_whatever_its_number(teams):
     fleet = fleet_of([(0, 0, 0, 2.0), (20.0, 0, 0, 2.0), (10.0, 40.0, 180.0, 2.0)], teams)
     fleet = replace(fleet, controlled=np.array([True, True, False]))
     assert Shield().decide(fleet, relative(*[(2.0, 0.0)] * 3)).adversary_horizon_s[2] > 0.0
-
-
-@pytest.mark.parametrize("coordination", ["team", "per_boat"])
-def test_who_is_not_covered_any_more_is_bound_by_nobody(coordination):
-    shield, fleet = Shield(coordination=coordination), crowd(3)
-    wanted = relative(*[(2.0, 10.0)] * 5)
-    assert (shield.decide(fleet, wanted).bound[:3] >= 0).any()
-    alone = replace(fleet, controlled=np.array([False, True, False, False, False]))
-    assert (shield.decide(alone, wanted).bound[[0, 2, 3, 4]] == -1).all()
-
-
-def test_a_newcomers_decider_knows_what_the_others_were_told():
-    shield = Shield(coordination="per_boat", delay_s=0.3)
-    fleet = fleet_of([(0, 0, 0, 2.0), (30.0, 0, 0, 2.0)], [0, 0], names=("b", "c"))
-    for _ in range(3):
-        shield.decide(fleet, relative((2.0, 5.0), (2.0, -5.0)))
-    more = fleet_of([(-30.0, 0, 0, 2.0), (0, 0, 0, 2.0), (30.0, 0, 0, 2.0)], [0, 0, 0], names=("a", "b", "c"))
-    shield.decide(more, relative((2.0, 0.0), (2.0, 5.0), (2.0, -5.0)))
-    assert np.isfinite(shield._deciders.scene.pending[:, :, 1:]).all()
 
 
 @pytest.mark.parametrize("solver", ["active_set", "daqp"])

@@ -7,7 +7,6 @@ from shield_scenes import head_on
 from steerclear.shield import Commands, Fleet, Shield, ShieldConfig
 from steerclear.shield.batch import BatchedShield
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.tracks import steps_of_delay
 
 STEPS = 3
 
@@ -63,19 +62,6 @@ def test_safe_commands_pass_bit_for_bit():
         assert (decide(state, wanted) == wanted).all()
 
 
-def test_reset_forgets_what_was_on_its_way():
-    fleet = head_on(gap_m=14.0)
-    state = fleet.state.copy()
-    fill(state, packed(fleet.platforms))
-    wanted = np.array([[[2.0, 40.0], [2.0, 0.0]]])
-    shield = BatchedShield(ShieldConfig(delay_s=0.5), 1, fleet.platforms, tuple(fleet.team))
-    first = shield.decide(state[None], wanted, fleet.controlled[None]).copy()
-    for _ in range(5):
-        shield.decide(state[None], np.array([[[0.0, -90.0], [2.0, 0.0]]]), fleet.controlled[None])
-    shield.reset()
-    assert (shield.decide(state[None], wanted, fleet.controlled[None]) == first).all()
-
-
 @pytest.mark.parametrize("nonsense", [(2.0, np.nan), (np.inf, 0.0), (2.0, 1e300)])
 def test_what_others_told_a_boat_before_it_was_ours_may_be_nonsense(nonsense):
     fleet = head_on(gap_m=4.0)
@@ -85,8 +71,3 @@ def test_what_others_told_a_boat_before_it_was_ours_may_be_nonsense(nonsense):
     decision = shield.decide(fleet, Commands.relative_deg([(2.0, 0.0), (2.0, 0.0)]))[0]
     assert np.isfinite([decision.filtered_speed_mps, decision.filtered_heading_rad, decision.safety_margin_m]).all()
     assert decision.safety_margin_m < 0.0
-
-
-@pytest.mark.parametrize(("delay_s", "steps"), [(0.0, 0), (0.04, 1), (0.1, 1), (0.14, 2), (0.3, 3)])
-def test_a_delay_counts_up_to_the_next_step(delay_s, steps):
-    assert steps_of_delay(ShieldConfig(delay_s=delay_s)) == steps

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 from shield_scenes import fleet_of, relative
 from steerclear.shield import Shield, ShieldConfig
-from steerclear.shield.exceptions import FleetError
-from steerclear.shield.fleet import Fleet
 from steerclear.shield.platforms import layout as L
 
 STRAIGHT = relative((3.0, 0.0), (3.0, 0.0))
@@ -63,22 +61,3 @@ def test_a_decision_says_how_long_it_feared_whom():
     assert [d.adversary_horizon_s for d in told] == [None, 0.0], (
         "with this profile nobody is feared, whatever is said of one"
     )
-
-
-def test_it_is_told_in_the_fleets_order():
-    fleet = fleet_of(
-        [(0.0, 0.0, 0.0, 1.0), (30.0, 0.0, 0.0, 1.0), (0.0, 30.0, 0.0, 1.0)], [1, 0, 1], names=["c", "a", "b"]
-    )
-    fleet = replace(fleet, adversary_horizon_s=np.array([3.0, np.nan, 5.0]))
-    told = Shield().decide(fleet, relative((1.0, 0.0), (1.0, 0.0), (1.0, 0.0)))
-    assert [decision.adversary_horizon_s for decision in told] == [3.0, None, 5.0]
-
-
-@pytest.mark.parametrize(
-    "more", [{"adversary_horizon_s": [0.0, -1.0]}, {"adversary_horizon_s": [1.0]}, {"visiting": [0.0, 0.5]}]
-)
-def test_what_cannot_be_is_refused(more):
-    with pytest.raises(FleetError, match=next(iter(more))):
-        Fleet.of(
-            position_m=[[0, 0], [9, 9]], heading_deg=[0, 0], speed_mps=[1, 1], team=[0, 1], platforms="heron", **more
-        )

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from shield_scenes import head_on, relative
 from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
-from steerclear.shield import Commands, Shield, ShieldConfig
-from steerclear.shield.exceptions import ConfigError, FleetError
-from steerclear.shield.fleet import Fleet
+from steerclear.shield import Shield, ShieldConfig
+from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.actuator import command_for_turn, full_turn
@@ -128,49 +128,20 @@ def test_shields_for_moves_and_for_decisions_are_told_apart():
             ShieldedTeamPolicy(policies.make("medium"), Shield(other)).reset(env, BLUE, 0)
 
 
-@pytest.mark.parametrize("move_s", [0.3, 0.0, -0.1, "fast", True])
-def test_moves_that_do_not_make_up_a_step_are_refused(move_s):
-    with pytest.raises(ConfigError, match="move_s"):
-        ShieldConfig(dt_s=1.0, move_s=move_s)
-
-
-def test_driven_rows_of_another_shape_are_refused():
-    fleet = Fleet.of(
-        position_m=[[0.0, 0.0], [9.0, 9.0]], heading_deg=[0, 0], speed_mps=[1, 1], team=[0, 1], platforms="heron"
-    )
-    with pytest.raises(FleetError, match=r"driven has shape \(2, 3\); expected \(2, 4\)"):
-        replace(fleet, driven=np.zeros((2, 3)))
-
-
-@pytest.mark.parametrize(
-    "row",
-    [
-        (2.0, 5.0, np.nan, 100.0),
-        (2.0, np.nan, 5.0, 100.0),
-        (2.0, np.inf, 5.0, 100.0),
-        (-1.0, np.nan, np.nan, 100.0),
-        (np.inf, np.nan, np.nan, 100.0),
-        (1e3, np.nan, np.nan, 100.0),
-        (0.0, np.nan, np.nan, np.nan),
-        (0.0, np.nan, np.nan, 0.5),
-    ],
-)
-def test_a_drive_that_says_no_way_makes_nobody_harmless(row):
+def test_a_drive_that_says_no_way_makes_nobody_harmless():
     """Such a boat is feared as any other; one whose drive is whole is not."""
 
-    def decided(drive):
-        shield = Shield(profile="ramming")
-        fleet = Fleet.of(
-            position_m=[[0, 0], [0, 6.5]],
-            heading_rad=[0, np.pi],
-            speed_mps=[2, 2],
-            team=[0, 1],
-            platforms="heron",
-        )
-        if drive is not None:
-            fleet = replace(fleet, driven=np.array([[np.nan] * 4, drive]))
-        told = shield.decide(fleet, Commands.relative_deg([[2.0, 0.0], [2.0, 0.0]]))
+    def decided(*drive):
+        fleet = replace(head_on(6.5), driven=np.array([[np.nan] * 4, drive]))
+        told = Shield(profile="ramming").decide(fleet, relative((2.0, 0.0), (2.0, 0.0)))
         return told.filtered.values.tolist(), told.safety_margin_m.tolist()
 
-    assert decided(row) == decided(None)
-    assert decided((2.0, 60.0, 6.5, 100.0)) != decided(None)
+    none = np.nan
+    feared = decided(none, none, none, none)
+    for row in ((2.0, 5.0, none, 100.0), (2.0, none, 5.0, 100.0), (2.0, np.inf, 5.0, 100.0)):
+        assert decided(*row) == feared
+    for speed_mps in (-1.0, np.inf, 1e3):
+        assert decided(speed_mps, none, none, 100.0) == feared
+    for time_s in (none, 0.5):
+        assert decided(0.0, none, none, time_s) == feared
+    assert decided(2.0, 60.0, 6.5, 100.0) != feared

@@ -59,11 +59,6 @@ def test_what_passes_for_a_boat_alone_is_sent_as_it_is_and_nothing_is_remembered
     assert max(passing) > 0.0
 
 
-def test_commands_that_no_boat_does_and_none_at_all_do_not_pass():
-    odd = [Commands.relative_deg([[speed, 0.0]] * 2) for speed in (9.0, np.nan, 1.0)]
-    assert Shield().safe_actions(alone_at(-9.0), odd).tolist() == [[False, False, True], [True, True, True]]
-
-
 def test_what_are_no_candidates_is_one_error():
     for actions in ([], ACTIONS[0]):
         with pytest.raises(FleetError, match="give a list of them, one for each candidate"):

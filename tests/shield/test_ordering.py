@@ -61,7 +61,7 @@ def moved(fleet, quarter_turns, shift_m):
 def test_where_a_scene_lies_and_which_way_it_faces_changes_hardly_anything(platform):
     """Rounding decides only where two rows of the program are alike to the last bits, and pull it different ways."""
     changed, other_ways = 0, []
-    for seed in range(100):
+    for seed in range(50):
         fleet, turns = scene(seed, platform)
         elsewhere = moved(fleet, 1 + seed % 3, (731.3, -412.7))
         one, other = (
@@ -70,8 +70,8 @@ def test_where_a_scene_lies_and_which_way_it_faces_changes_hardly_anything(platf
         if (one.reason != other.reason).any() or np.abs(one.sent - other.sent).max() > 1e-5:
             other_ways.append(seed)
         changed += int((one.reason[:, :3] != Reason.PASSED).sum())
-    assert len(other_ways) <= 4, other_ways  # of 100 scenes
-    assert changed > 600  # of 1,200: the scenes are such that there is something to decide
+    assert len(other_ways) <= 2, other_ways  # of 50 scenes
+    assert changed > 300  # of 600: the scenes are such that there is something to decide
 
 
 @pytest.mark.parametrize(

@@ -1,22 +1,25 @@
 """Settings are checked when they are given, in words that help."""
 
+import copy
 import math
-from dataclasses import FrozenInstanceError, fields
+import pickle
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from steerclear.shield import Shield, ShieldConfig
-from steerclear.shield.backup.family import OPPONENT_MODELS
-from steerclear.shield.config import COORDINATION, PROFILES
-from steerclear.shield.exceptions import ConfigError, SolverError, SteerclearError
+from steerclear.shield import Commands, Fleet, Shield, ShieldConfig, Surroundings
+from steerclear.shield.exceptions import ConfigError, FleetError
+from steerclear.shield.renamed import DECISION, DECISIONS, PROFILES, SETTINGS, current_settings
 
 RANGES = {entry.name: entry.metadata["range"] for entry in fields(ShieldConfig) if "range" in entry.metadata}
-TEXTS = ("beyond_then", "opponent_model", "coordination", "profile", "solver")
+
 ABOVE_ZERO = {
     *("separation_m", "dt_s", "move_s", "cbf_rate_per_s", "table_cbf_rate_per_s", "static_cbf_rate_per_s"),
     *("deadlock_timeout_s", "work_budget", "speed_weight", "horizon_s"),
 }
+
 MAY_BE_NONE = {"adversary_horizon_s", "intruder_horizon_s", "move_s", "horizon_s", "edge_m", "beyond_m"}
+
 MAY_BE_INFINITE = {
     *("adversary_horizon_s", "intruder_horizon_s", "cbf_rate_per_s", "table_cbf_rate_per_s", "static_cbf_rate_per_s"),
     *("deadlock_timeout_s", "max_track_age_s", "work_budget"),
@@ -45,44 +48,6 @@ def test_a_number_is_taken_where_it_makes_sense_and_else_refused_by_name(name):
         assert getattr(ShieldConfig(**{name: value, **more}), name) == value
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "text"),
-    [
-        ("separation_m", 2500, r"2500 \(if that is mm, give 2.5\); give more than 0 and at most 1000 m"),
-        ("dt_s", 100.0, r"100.0 \(if that is ms, give 0.1\); give 0.01 to 2 s"),
-        ("current_mps", 300, r"300 \(if that is mm/s, give 0.3\); give 0 to 10 m/s"),
-        ("track_error_mps", 51, "51; give 0 to 50 m/s$"),
-        ("speed_weight", 1e7, r"10000000.0; give more than 0 and at most 1e\+06$"),
-        ("work_budget", 10, "10; give 1000 to inf clearances$"),
-        ("cbf_rate_per_s", -1, "-1; give more than 0 and at most inf 1/s$"),
-        ("separation_m", 10**400, "too large; give a finite number"),
-    ],
-)
-def test_a_number_of_another_unit_is_told_its_range_and_what_it_may_be(name, value, text):
-    with pytest.raises(ConfigError, match=f"^{name} is {text}"):
-        ShieldConfig(**{name: value})
-
-
-@pytest.mark.parametrize("name", TEXTS)
-@pytest.mark.parametrize("value", [None, 3, ["daqp"], True])
-def test_names_must_be_texts(name, value):
-    with pytest.raises(ConfigError, match=f"{name} is .*give a name"):
-        ShieldConfig(**{name: value})
-
-
-@pytest.mark.parametrize(
-    ("name", "known"), [("opponent_model", OPPONENT_MODELS), ("coordination", COORDINATION), ("profile", PROFILES)]
-)
-def test_unknown_names_are_told_the_known_ones(name, known):
-    with pytest.raises(ConfigError, match=f"unknown {name} 'magic'; choose one of {', '.join(known)}"):
-        ShieldConfig(**{name: "magic"})
-
-
-def test_a_backend_that_is_not_installed_is_told_with_the_remedy():
-    with pytest.raises(SolverError, match=r"'gurobi' is unknown .*not installed; choose one of .*daqp.*, or install"):
-        Shield(solver="gurobi")
-
-
 @pytest.mark.parametrize("entry", fields(ShieldConfig), ids=lambda entry: entry.name)
 def test_a_misspelt_key_is_told_the_nearest_known_one(entry):
     misspelt = entry.name[:2] + entry.name[3:]
@@ -90,38 +55,102 @@ def test_a_misspelt_key_is_told_the_nearest_known_one(entry):
         ShieldConfig.of(**{misspelt: 1.0})
 
 
-@pytest.mark.parametrize("key", ["separation", "radius_m", "separation_km", "dt", "DT_S"])
-def test_keys_without_their_unit_are_unknown(key):
-    with pytest.raises(ConfigError, match="unknown shield setting"):
-        ShieldConfig.of(**{key: 1.0})
-    with pytest.raises(ConfigError, match=r"known settings: separation_m, .*barriers"):
-        Shield(zzz=1)
-
-
-@pytest.mark.parametrize(
-    ("config", "more", "told"),
-    [
-        (ShieldConfig(), {"separation_m": 3.0}, "not both"),
-        ({"separation_m": 3.0}, {}, r"config is a dict; give a ShieldConfig, or settings: Shield\(\*\*settings\)"),
-        (None, {"surroundings": (0, 0, 10, 10)}, r"surroundings are a tuple; build them with Surroundings\("),
-    ],
-)
-def test_arguments_of_another_kind_are_refused(config, more, told):
-    with pytest.raises(ConfigError, match=told):
-        Shield(config, **more)
-
-
-def test_a_config_cannot_be_changed_behind_the_shields_back():
-    config = ShieldConfig()
-    assert Shield(config).config is config
-    with pytest.raises(FrozenInstanceError):
-        config.separation_m = 0.1
-    for error in (ConfigError, SolverError):
-        assert issubclass(error, SteerclearError)
-
-
 @pytest.mark.parametrize("kind", [np.float32, np.float64, np.int64, int])
 def test_numbers_of_any_kind_are_kept_as_floats_for_compiled_code(kind):
     config = ShieldConfig(separation_m=kind(3), margin_cap_m=kind(0), horizon_s=kind(6), edge_m=None)
     assert config == ShieldConfig(separation_m=3.0, margin_cap_m=0.0, horizon_s=6.0, edge_m=None)
     assert {type(config.separation_m), type(config.margin_cap_m), type(config.horizon_s)} == {float}
+
+
+TRIANGLE = [(0.0, 0.0), (4.0, 0.0), (2.0, 3.0)]
+
+HARBOUR = Surroundings((0, 0, 40, 20), [(1, 2, 3)], [TRIANGLE], [(5, 5, 2)], [(7, 7, 3)])
+
+
+def test_packing_widens_by_the_distances_of_the_settings_and_by_what_positions_may_be_off():
+    exact, off = (
+        HARBOUR.pack(ShieldConfig(edge_m=0.5, obstacle_clearance_m=1.5, position_error_m=error_m))
+        for error_m in (0.0, 0.25)
+    )
+    assert exact.field.tolist() == [0.5, 0.5, 39.5, 19.5]
+    assert exact.circles.tolist() == [[1.0, 2.0, 4.5], [7.0, 7.0, 3.0]]  # a circle that stops boats has no hull
+    assert exact.keep_out.tolist() == [[5.0, 5.0, 2.0]]
+    assert exact.segment_m == 1.5
+    starts, ends = ({tuple(row) for row in rows} for rows in (exact.segments[:, :2], exact.segments[:, 2:]))
+    assert starts == ends == set(TRIANGLE), "walls of a polygon close"
+    np.testing.assert_allclose(off.field - exact.field, [0.25, 0.25, -0.25, -0.25])
+    np.testing.assert_allclose(off.circles[:, 2] - exact.circles[:, 2], 0.25)
+    np.testing.assert_allclose(off.keep_out[:, 2] - exact.keep_out[:, 2], 0.25)
+    assert off.segment_m - exact.segment_m == 0.25
+    np.testing.assert_array_equal(off.segments, exact.segments)
+    assert np.isinf(HARBOUR.pack(ShieldConfig(edge_m=None)).field).all()
+
+
+def test_a_field_of_which_nothing_is_left_is_refused_when_the_shield_is_built():
+    small = Surroundings(field=(0.0, 0.0, 40.0, 3.0))
+    Shield(ShieldConfig(edge_m=0.5, position_error_m=0.9), small)
+    with pytest.raises(ConfigError, match=r"too small to keep 1\.6 m inside its edge; give a larger field"):
+        Shield(ShieldConfig(edge_m=0.5, position_error_m=1.1), small)
+    Shield(ShieldConfig(edge_m=None, position_error_m=1.1), small)
+
+
+@pytest.mark.parametrize(("old", "new"), SETTINGS.items())
+def test_a_setting_is_taken_by_its_old_name_with_a_warning(old, new):
+    value = "turning_circle" if old == "certificate" else 1500.0 if old == "search_limit" else 1.5
+    for make in (ShieldConfig, ShieldConfig.of, lambda **one: Shield(**one).config):
+        with pytest.warns(DeprecationWarning, match=f"'{old}' is now '{new}'"):
+            config = make(**{old: value})
+        assert getattr(config, new) == value
+        with pytest.warns(DeprecationWarning, match=new):
+            assert getattr(config, old) == value
+    with pytest.warns(DeprecationWarning, match=new):
+        assert getattr(replace(ShieldConfig(), **{old: value}), new) == value
+
+
+@pytest.mark.parametrize(("old", "new"), PROFILES.items())
+def test_a_profile_is_taken_by_its_old_name(old, new):
+    with pytest.warns(DeprecationWarning, match=new):
+        assert ShieldConfig(profile=old) == ShieldConfig(profile=new)
+
+
+def test_decisions_are_read_by_their_old_names():
+    with pytest.warns(DeprecationWarning, match="adversary_horizon_s"):
+        told = Fleet.of(
+            position_m=[[0, 0], [0, 30]],
+            heading_deg=[0, 180],
+            speed_mps=[1, 1],
+            team=[0, 1],
+            platforms="heron",
+            adversary_s=[math.nan, 3.0],
+        )
+    with pytest.warns(DeprecationWarning, match="adversary_horizon_s"):
+        assert told.adversary_s is told.adversary_horizon_s
+    decisions = Shield().decide(told, Commands.relative_deg([[1.0, 0.0]] * 2))
+    for owner, names in ((decisions, DECISIONS), (decisions[0], DECISION)):
+        for old, new in names.items():
+            with pytest.warns(DeprecationWarning, match=f"'{old}' is now '{new}'"):
+                assert getattr(owner, old) is getattr(owner, new)
+        with pytest.raises(AttributeError, match="no attribute 'wnated'"):
+            owner.wnated  # noqa: B018
+        assert copy.copy(owner).reason is owner.reason
+    assert pickle.loads(pickle.dumps(decisions[0])) == decisions[0]
+
+
+def test_stored_settings_are_read_without_a_warning(caplog):
+    stored = {"adversary_s": 5.0, "profile": "rammers", "separation_m": 4.0, "barriers": ["ferry"]}
+    now = {"adversary_horizon_s": 5.0, "profile": "ramming", "separation_m": 4.0, "barriers": ["ferry"]}
+    assert current_settings(stored) == current_settings(now) == now
+    assert not caplog.text
+    assert current_settings(stored, warned=True) == now
+    assert "adversary_s is now adversary_horizon_s" in caplog.text
+    assert "rammers is now ramming" in caplog.text
+
+
+def test_decide_takes_nominal_commands_by_their_old_name_too_and_warns():
+    fleet = Fleet.of(position_m=[[0, 0]], heading_rad=[0.0], speed_mps=[1.0], team=[0], platforms="heron")
+    commands = Commands.absolute_deg([[1.0, 0.0]])
+    with pytest.warns(DeprecationWarning, match="'wanted' is now 'nominal'"):
+        old = Shield().decide(fleet, wanted=commands)
+    assert (old.filtered.values == Shield().decide(fleet, commands).filtered.values).all()
+    with pytest.raises(FleetError, match="decide takes a Fleet and Commands"):
+        Shield().decide(fleet)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from shield_loops import fill, packed, sail, step_all
 from shield_scenes import fleet_of
-from steerclear.shield import Commands, Fleet, Reason, Shield, ShieldConfig, Surroundings
+from steerclear.shield import Commands, Fleet, Reason, Shield, Surroundings
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
 
@@ -12,7 +12,6 @@ GOAL_M = {"heron": 30.0, "surveyor": 72.0}
 STEPS = {"heron": 450, "surveyor": 600}
 COMES = {"heron": (-13.5, 6.75, 60.0, 1.96), "surveyor": (-33.0, 27.7, 53.0, 2.45)}
 """Opponents that come from the left: east and north, m, heading, deg, speed, m/s."""
-CAP_M = ShieldConfig().teammate_margin_cap_m
 
 
 def crossing(platform):
@@ -58,35 +57,6 @@ def test_no_boat_gives_way_to_an_opponent(platform):
     assert (run.reason[:, 0] == Reason.BACKUP).any()
     assert not (run.reason[:, 0] == Reason.RIGHT_OF_WAY).any()
     assert run.closest(np.array([True, False])) >= 2.5
-
-
-def test_margins_from_team_mates_shrink_freely_until_they_are_small():
-    """Two boats head on pass as they want until little is left; a far larger margin is asked for without that."""
-    top, closest, changed = 2.0, [], []
-    for cap_m in (CAP_M, ShieldConfig().margin_cap_m):
-        fleet = fleet_of([(0.0, 0.0, 0.0, top), (2.4, 40.0, 180.0, top)], [0, 0], "heron")
-        run = sail(
-            Shield(ShieldConfig(teammate_margin_cap_m=cap_m)),
-            fleet,
-            lambda step, state: np.tile([top, 0.0], (2, 1)),
-            220,
-        )
-        closest.append(run.closest(np.ones(2, bool)))
-        changed.append((run.reason != Reason.PASSED).sum())
-    assert closest[0] >= 2.5
-    assert closest[1] > closest[0] + 0.5
-    assert changed[0] < changed[1]
-
-
-def test_boats_that_cannot_talk_keep_the_rate_of_others():
-    """What teammates will do is only known where one program decides for all."""
-    runs = []
-    for cap_m in (CAP_M, ShieldConfig().margin_cap_m):
-        config = ShieldConfig(coordination="per_boat", teammate_margin_cap_m=cap_m)
-        fleet = fleet_of([(0.0, 0.0, 0.0, 2.0), (1.0, 40.0, 180.0, 2.0)], [0, 0], "heron")
-        runs.append(sail(Shield(config), fleet, lambda step, state: np.tile([2.0, 0.0], (2, 1)), 220))
-    np.testing.assert_array_equal(runs[0].sent, runs[1].sent)
-    assert (runs[0].reason != Reason.PASSED).any()
 
 
 def test_of_a_command_changed_for_an_edge_the_edge_is_told():
@@ -144,16 +114,3 @@ def test_an_opponent_that_is_overtaken_is_passed():
     assert (run.reason[:, 0] == Reason.BACKUP).any()
     assert run.closest(np.array([True, False])) >= 2.5
     assert run.position[:, 0, 1].max() > 57.0
-
-
-@pytest.mark.parametrize(
-    "settings",
-    [{"position_error_m": 0.1}, {"delay_s": 0.3}, {"current_mps": 0.2}, {"adversary_horizon_s": 0.0}],
-)
-def test_where_nothing_is_exact_or_feared_team_mates_are_as_others(settings):
-    runs = []
-    for cap_m in (CAP_M, ShieldConfig().margin_cap_m):
-        config = ShieldConfig(teammate_margin_cap_m=cap_m, **settings)
-        fleet = fleet_of([(0.0, 0.0, 0.0, 2.0), (1.0, 40.0, 180.0, 2.0)], [0, 0], "heron")
-        runs.append(sail(Shield(config), fleet, lambda step, state: np.tile([2.0, 0.0], (2, 1)), 150))
-    np.testing.assert_array_equal(runs[0].sent, runs[1].sent)

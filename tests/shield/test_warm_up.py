@@ -1,12 +1,9 @@
 """Everything is compiled before the first decision, and nothing is remembered of it."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from shield_scenes import head_on, signatures
+from shield_scenes import head_on
 from steerclear.shield import Commands, Shield, decide, shield
-from steerclear.shield.exceptions import PlatformError
 
 AHEAD = Commands.relative_deg(np.array([[2.0, 0.0]] * 2))
 STAGES = "begin", "begin_group", "linearise", "accept", "end_group", "end"
@@ -43,28 +40,8 @@ def test_decisions_are_the_same_with_and_without(coordination):
     np.testing.assert_array_equal(*told)
 
 
-def test_a_fleets_tables_are_read_and_unknown_boats_refused(monkeypatch):
-    read = []
-    boats_of = shield.boats_of
-    monkeypatch.setattr(shield, "boats_of", lambda *values: (read.append(values[1]), boats_of(*values))[1])
-    Shield().warm_up(head_on(5.5, "surveyor"))
-    assert ("surveyor",) * 2 in read
-    with pytest.raises(PlatformError, match="raft"):
-        Shield().warm_up(replace(head_on(), platforms=("raft", "raft")))
-
-
 @pytest.mark.parametrize("settings", [{}, {"position_error_m": 0.3, "delay_s": 0.2}, {"separation_m": 4.0}])
 def test_every_stage_is_compiled_whatever_the_settings(stages_run, settings):
     """Wide margins leave no room for the program where the boats are; its check would be compiled under way."""
     Shield(solver="daqp", **settings).warm_up()
     assert stages_run == set(STAGES)
-
-
-def test_nothing_is_compiled_after_it():
-    Shield().warm_up()
-    before = signatures()
-    fleet, wanted, around = shield._tight_spot()
-    guard = Shield()
-    for _ in range(3):
-        guard.decide(fleet, wanted, around)
-    assert signatures() == before

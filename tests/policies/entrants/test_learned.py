@@ -1,4 +1,6 @@
-from dataclasses import replace
+"""Raids by a network: one game as one of a batch, sides and edges alike, as undertow where it says nothing."""
+
+from dataclasses import astuple, replace
 from itertools import pairwise
 
 import numpy as np
@@ -7,9 +9,12 @@ from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
 from steerclear.env.mctf import MctfEnv
-from steerclear.policies.entrants.learned import LearnedBatch, read_weights
-from steerclear.policies.entrants.learned.network import Features, Network, joined, write_weights
+from steerclear.policies.entrants.learned import LearnedBatch, RaidsBatch, batch_of
+from steerclear.policies.entrants.learned.network import Features, Network, joined, read_weights, write_weights
+from steerclear.policies.entrants.learned.raids import SEEN
+from steerclear.policies.entrants.undertow.shape import LIMITS, NAMES, SCRIPTED, Shape
 from steerclear.shield.exceptions import PolicyError
+from steerclear.shield.platforms import layout as L
 from steerclear.shield.wrappers import TeamBatch
 
 
@@ -20,16 +25,6 @@ def network(roles=1, interval=5, kind="discrete", n_obs=61, seed=0):
     weights = [rng.normal(size=(roles, a, b)).astype(np.float32) for a, b in pairwise(sizes)]
     biases = [rng.normal(size=(roles, b)).astype(np.float32) for b in sizes[1:]]
     return Network(weights, biases, features, "tanh", kind, interval, n_obs, {"note": "test"})
-
-
-def test_weights_come_back_as_they_were(tmp_path):
-    for kind in ("discrete", "normalised"):
-        one = network(3, kind=kind)
-        two = read_weights(write_weights(one, tmp_path / "w.npz"))
-        seen = np.random.default_rng(1).uniform(-1, 1, (50, 61)).astype(np.float32)
-        roles = np.arange(50) % 3
-        np.testing.assert_array_equal(one.outputs(seen, roles), two.outputs(seen, roles))
-        assert two.card == {"note": "test"}
 
 
 def test_files_that_are_no_weights_are_refused_in_one_line(tmp_path):
@@ -46,6 +41,9 @@ def test_files_that_are_no_weights_are_refused_in_one_line(tmp_path):
     np.savez(tmp_path / "other.npz", about=np.array('{"format": "x"}'))
     with pytest.raises(PolicyError, match="another kind of file"):
         read_weights(tmp_path / "other.npz")
+    write_weights(network(n_obs=30), tmp_path / "short.npz")
+    with pytest.raises(PolicyError, match="takes observations of 30 numbers, this game makes 61"):
+        policies.make_batch(f"weights:{tmp_path / 'short.npz'}").reset(BatchedMctf("aamas2024", 1), 0, 0)
     with pytest.raises(PolicyError, match="there are no weights"):
         policies.make("weights:none.npz")
 
@@ -66,12 +64,6 @@ def test_one_game_plays_as_one_of_a_batch(tmp_path):
         np.testing.assert_allclose(list(actions.values()), commands[0, :3], atol=1e-9)
         observations, _, _, _, infos = env.step(actions)
         core.step(commands)
-
-
-def test_a_network_for_other_games_is_refused(tmp_path):
-    path = write_weights(network(n_obs=30), tmp_path / "w.npz")
-    with pytest.raises(PolicyError, match="takes observations of 30 numbers, this game makes 61"):
-        policies.make_batch(f"weights:{path}").reset(BatchedMctf("aamas2024", 1), 0, 0)
 
 
 def test_a_second_network_takes_over_where_the_flag_is_held(tmp_path):
@@ -114,3 +106,117 @@ def test_a_team_plays_as_it_learned(tmp_path):
             played.step(commands)
     assert asked
     np.testing.assert_allclose(played.state, learned.state, atol=1e-9)
+
+
+NONE = Features(np.zeros(0, np.int64), np.zeros(0, np.int64), 0.0)
+
+
+def raids_network(scale=0.5, interval=10, seed=0):
+    rng = np.random.default_rng(seed)
+    sizes = ((SEEN, 8), (8, len(NAMES)))
+    weights = [(scale * rng.normal(size=(1, *size))).astype(np.float32) for size in sizes]
+    biases = [np.zeros((1, size[1]), np.float32) for size in sizes]
+    return Network(weights, biases, NONE, "tanh", "raids", interval, SEEN, {"preset": "aamas2024"})
+
+
+@pytest.fixture
+def config():
+    return GameConfig.preset("aamas2024", max_time_s=40.0, default_start=False)
+
+
+def test_a_shape_moves_by_units_and_stays_within_limits():
+    assert set(LIMITS) == set(NAMES)
+    for name in NAMES:
+        unit, low, high = LIMITS[name]
+        assert unit > 0.0
+        assert low <= getattr(SCRIPTED, name) <= high
+    units = np.zeros(len(NAMES))
+    assert SCRIPTED.moved(units) == SCRIPTED == Shape()
+    units[NAMES.index("gap_m")] = -0.5
+    assert SCRIPTED.moved(units) == replace(SCRIPTED, gap_m=SCRIPTED.gap_m - 0.5 * LIMITS["gap_m"][0])
+    highest = astuple(SCRIPTED.moved(np.full(len(NAMES), 1e6)))
+    assert highest == tuple(LIMITS[name][2] for name in NAMES)
+
+
+def test_one_game_plays_as_one_of_a_batch_on_either_side(config, tmp_path):
+    path = write_weights(raids_network(), tmp_path / "w.npz")
+    for team in (0, 1):
+        env, core = MctfEnv(config, action_kind="continuous"), BatchedMctf(config, n_games=1)
+        observations, infos = env.reset(seed=3)
+        core.reset(seed=3)
+        single, batch = policies.make(f"weights:{path}"), policies.make_batch(f"weights:{path}")
+        ids = [agent for agent, side in zip(config.agent_ids, core.team, strict=True) if side == team]
+        single.reset(env, ids, 1)
+        batch.reset(core, team, 1)
+        boats = np.flatnonzero(core.team == team)
+        for _ in range(150):
+            commands = np.zeros((1, core.n_boats, 2))
+            commands[:, boats] = batch.act(core, team)
+            observations, _, _, _, infos = env.step(single.act(observations, infos))
+            core.step(commands)
+            np.testing.assert_allclose(env.core.state, core.state, rtol=0.0, atol=1e-6)
+
+
+def test_a_network_that_says_nothing_sails_as_undertow(config):
+    env, core = MctfEnv(config, action_kind="continuous"), BatchedMctf(config, n_games=1)
+    observations, infos = env.reset(seed=4)
+    core.reset(seed=4)
+    script, batch = policies.make("undertow"), batch_of(raids_network(0.0, interval=1))
+    script.reset(env, config.agent_ids[:3], 1)
+    batch.reset(core, 0, 1)
+    for _ in range(300):
+        commands = np.zeros((1, core.n_boats, 2))
+        commands[:, :3] = batch.act(core, 0)
+        observations, _, _, _, infos = env.step(script.act(observations, infos))
+        core.step(commands)
+    np.testing.assert_allclose(env.core.state, core.state, rtol=0.0, atol=1e-6)
+
+
+def test_what_is_seen_is_the_same_from_both_sides_and_edges(config):
+    core = BatchedMctf(config, n_games=3, seed=1)
+    core.reset(seed=1)
+    width_m, height_m = config.env_bounds_m
+    state = core.games.state
+    state[1:] = state[0]
+    state[1, :, L.Y] = height_m - state[0, :, L.Y]
+    state[1, :, L.HEADING] = 180.0 - state[0, :, L.HEADING]
+    state[2] = np.roll(state[0], 3, axis=0)
+    state[2, :, L.X], state[2, :, L.Y] = width_m - state[2, :, L.X], height_m - state[2, :, L.Y]
+    state[2, :, L.HEADING] += 180.0
+    teams = [RaidsBatch(raids_network()) for _ in range(2)]
+    for team, one in enumerate(teams):
+        one.reset(core, team, 1)
+    teams[0].raids[1].upper = False
+    games = np.arange(3)
+    upper, lower, _ = teams[0].seen(games)
+    assert upper.shape == (SEEN,)
+    np.testing.assert_allclose(upper, lower, atol=1e-6)
+    np.testing.assert_allclose(upper, teams[1].seen(games)[2], atol=1e-6)
+
+
+def test_a_team_whose_boats_are_all_tagged_waits(config):
+    core = BatchedMctf(config, n_games=1, seed=1)
+    core.games.is_tagged[0, :3] = True
+    core.games.on_side[0, 3:] = False
+    team = RaidsBatch(raids_network())
+    team.reset(core, 0, 1)
+    np.testing.assert_array_equal(team.act(core, 0), 0.0)
+
+
+def test_weights_of_other_games_files_or_ways_to_play_are_refused(config, tmp_path):
+    path = write_weights(raids_network(), tmp_path / "w.npz")
+    assert read_weights(path).kind == "raids"
+    with pytest.raises(PolicyError, match="no probabilities"):
+        policies.make_batch(f"weights:{path}", sample=True)
+    batch = policies.make_batch(f"weights:{path}")
+    with pytest.raises(PolicyError, match="team_size 3"):
+        batch.reset(BatchedMctf(GameConfig.preset("aamas2024", team_size=2), n_games=1), 0, 1)
+    core = BatchedMctf(config, n_games=1)
+    core.reset(seed=1)
+    with pytest.raises(PolicyError, match="call reset first"):
+        batch.act(core, 0)
+    with pytest.raises(PolicyError, match="train it anew"):
+        RaidsBatch(replace(raids_network(), n_obs=61))
+    wrong = replace(raids_network(), kind="discrete")
+    with pytest.raises(PolicyError, match="outputs are no discrete actions"):
+        read_weights(write_weights(wrong, tmp_path / "wrong.npz"))

@@ -77,24 +77,6 @@ def test_a_raid_is_given_up_when_a_boat_it_needs_is_tagged(sight, lost):
     assert raid.phase == Phase.GATHER
 
 
-def test_the_third_boat_waits_while_the_guard_is_near_it(sight):
-    raid = Raid(sight)
-    raid.advance(sight)
-    raid.advance(moved(sight, 5.0, {0: {"x": 41.5}}, {2: {"x": 50.0, "y": 27.0}}))
-    raid.advance(moved(sight, 12.0, {1: {"x": 55.0}}, {2: {"x": 45.0, "y": 25.0}}))
-    assert raid.phase == Phase.DRAG
-
-
-def test_no_raid_begins_with_another_opponent_in_the_way_and_the_chart_is_turned(sight):
-    blocked = moved(sight, 0.0, foes={0: {"x": 50.0, "y": 36.0, "on_side": True}})
-    raid = Raid(blocked)
-    raid.advance(blocked)
-    assert raid.phase == Phase.GATHER
-    assert raid.upper
-    raid.advance(replace(blocked, time=blocked.time + 31.0))
-    assert not raid.upper
-
-
 GUARD_AWAY, NOBODY_HOME = [*PLACES[:5], [75.0, 3.0]], [*APART[:2], [38.0, 6.0], [20.0, 38.0], [5.0, 38.0], [12.0, 38.0]]
 
 
@@ -111,52 +93,26 @@ def test_it_brings_a_flag_home_where_the_guard_is_drawn_away_or_nobody_stays_the
 
 
 ALL_HERE = {0: {"x": 12.0, "y": 38.0}, 1: {"x": 20.0, "y": 38.0}, 2: {"x": 30.0, "y": 34.0, "on_side": False}}
+CUT_OFF = {0: {"x": 55.0, "y": 12.0, "on_side": True}, 1: {"x": 50.0, "y": 6.0, "on_side": True}}
 
 
-def alone(sight):
-    """A moment at which all opponents are on the own side and the third boat waits at the other edge; its raid."""
+@pytest.mark.parametrize(("own", "foes"), [({}, {}), ({2: {"tagged": True}}, {}), ({}, CUT_OFF)])
+def test_once_every_opponent_has_come_the_third_boat_sails_alone_unless_tagged_or_cut_off(sight, own, foes):
+    """It waits at the other edge until then."""
     here = moved(sight, 0.0, {2: {"x": 38.0, "y": 6.0}}, {n: {"on_side": False, **at} for n, at in ALL_HERE.items()})
     raid = Raid(here)
     raid.advance(here)
-    return raid, here
-
-
-def test_once_every_opponent_has_come_the_third_boat_sails_alone_and_brings_the_flag_home(sight):
-    raid, here = alone(sight)
-    assert raid.unguarded
-    assert raid.phase == Phase.RUN
-    assert not raid.upper
-    raid.advance(moved(here, 12.0, {2: {"x": 62.0, "carries": True}}))
-    assert raid.held
-    raid.advance(moved(here, 25.0, {2: {"x": 39.0}}))
-    assert raid.phase == Phase.GATHER
+    assert (raid.unguarded, raid.phase, raid.upper) == (True, Phase.RUN, False)
+    raid.advance(moved(here, 1.0, own, foes))
+    assert raid.phase == (Phase.GATHER if own or foes else Phase.RUN)
+    if raid.phase == Phase.RUN:
+        raid.advance(moved(here, 12.0, {2: {"x": 62.0, "carries": True}}))
+        assert raid.held
+        raid.advance(moved(here, 25.0, {2: {"x": 39.0}}))
+        assert raid.phase == Phase.GATHER
     again = Raid(here)
     again.remember(raid.memory(here.time), here.time, mirrored=False)
     assert again.unguarded
-
-
-def test_while_one_opponent_has_stayed_at_home_it_is_drawn_away_as_before(sight):
-    raid = Raid(sight)
-    for number in (0, 1):
-        raid.advance(moved(sight, 1.0, foes={number: {"x": 20.0}}))
-    assert not raid.unguarded
-    assert raid.phase == Phase.BAIT
-    raid.advance(moved(sight, 2.0, foes={2: {"x": 20.0}}))
-    assert raid.unguarded
-    assert raid.phase == Phase.GATHER
-
-
-@pytest.mark.parametrize(
-    ("own", "foes"),
-    [
-        ({2: {"tagged": True}}, {}),
-        ({}, {0: {"x": 55.0, "y": 12.0, "on_side": True}, 1: {"x": 50.0, "y": 6.0, "on_side": True}}),
-    ],
-)
-def test_the_third_boat_gives_up_tagged_or_cut_off(sight, own, foes):
-    raid, here = alone(sight)
-    raid.advance(moved(here, 1.0, own, foes))
-    assert raid.phase == Phase.GATHER
 
 
 def test_distances_of_a_raid_grow_with_the_field_times_do_not_and_it_needs_three_boats():

@@ -24,23 +24,6 @@ def boats(own, other, **settings):
     return boats_of(ShieldConfig(**settings), (own, other), (0, 1))
 
 
-def chase_s(at, i=0, j=1):
-    """Time boat i is followed for by boat j, s."""
-    return (at.pursuit_samples[i] + at.chase_samples[i, j]) * at.sample_s
-
-
-def test_who_is_no_faster_is_followed_for_longer():
-    alike, faster = boats("heron", "heron"), boats("heron", "surveyor")
-    assert chase_s(alike) == pytest.approx(CHASE_S, abs=0.5)
-    assert chase_s(faster) < 8.0
-    assert faster.chased_samples[0] == 0
-    assert chase_s(boats("surveyor", "heron")) > 45.0  # as long as a surveyor takes to gain its speed
-
-
-def test_nobody_is_followed_for_longer_who_only_holds_its_course():
-    assert chase_s(boats("heron", "heron", adversary_horizon_s=0.0)) < 8.0
-
-
 def any_boat(random, params):
     """State and commanded speed, m/s: drawn at random, or of a boat that has held a speed for a while."""
     top = float(params[L.MAX_SPEED])
@@ -140,9 +123,3 @@ def test_who_closes_in_from_the_quarter_is_seen_coming_for_half_a_minute(bearing
         <= table_m(bearing_deg, far_m, adversary_horizon_s=9.0) + 0.05
         <= table_m(bearing_deg, far_m, adversary_horizon_s=1.0) + 0.1
     )
-
-
-def test_that_decides_of_an_all_but_parallel_course():
-    assert table_m(97.0, 7.0, adversary_horizon_s=0.0) > 0.5  # it holds its course
-    assert table_m(97.0, 7.0) < 0.0
-    assert sailed_m(97.0, 7.0, 0.3 * CHASE_S, CHASE_S) < 2.5

@@ -104,16 +104,6 @@ def test_a_turn_does_to_the_margin_what_the_row_says(name, gap_m, error):
     assert np.median(np.abs(told - measured) / np.abs(measured)) < error
 
 
-@pytest.mark.parametrize(("name", "gap_m", "error"), [("surveyor", 10.0, 0.1), ("heron", 5.0, 0.3)])
-def test_team_mates_share_a_row_each_with_its_own_effect(name, gap_m, error):
-    pairs = [task.gradients() for task in linearised(np.random.default_rng(2), name, [0, 0], gap_m, 150)]
-    both = [(a[[0, 2]], b[[0, 2]]) for a, b in pairs if len(a) == 4]
-    assert len(both) > 25
-    told, measured = np.array(both).transpose(1, 0, 2).reshape(2, -1)
-    assert np.mean(np.sign(told) == np.sign(measured)) > 0.8
-    assert np.median(np.abs(told - measured) / np.abs(measured)) < error
-
-
 def edge(y):
     return Surroundings(field=(-200.0, -200.0, 200.0, y))
 
@@ -155,17 +145,3 @@ def test_a_turn_does_to_the_distance_from_fixed_things_what_the_row_says(around,
     assert len(told) > 10
     assert np.sign(told).tolist() == np.sign(measured).tolist()
     np.testing.assert_allclose(told, measured, rtol=0.1, atol=0.003)
-
-
-def test_rows_are_of_unit_length_and_limits_are_exact():
-    task = next(linearised(np.random.default_rng(4), "heron", [0, 0], 5.0, 50))
-    plan, n = task.at, 2 * task.count
-    count, found = built(task.at)
-    norms = np.linalg.norm(plan.C[:found, :n], axis=1)
-    np.testing.assert_allclose(norms, 1.0, atol=1e-12)
-    boxes = plan.label[:found, 1] == qp.LIMITS
-    assert boxes.sum() == 4 * count
-    root = np.sqrt(task.at.tuning.speed_weight)
-    for z, inside in (([0.5, 0.5 * root] * 2, True), ([1.01, 0.0] * 2, False), ([0.0, 1.01 * root] * 2, False)):
-        assert (plan.C[:found][boxes][:, :n] @ np.array(z[:n]) >= plan.d[:found][boxes]).all() == inside
-    assert not (plan.C[:found][boxes][:, :n] @ np.tile([0.0, -0.01], count) >= plan.d[:found][boxes]).all()

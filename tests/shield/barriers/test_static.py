@@ -172,19 +172,3 @@ def test_outside_the_field_the_way_back_is_worth_most_even_if_it_leads_farther_o
     straight_in = way_back((0, 12), (0, 11.5), (0, 11.0), (0, 10.5))
     assert goes_on < stays == along < turns_wide < turns < straight_in
     assert straight_in < 0.0
-
-
-def test_the_edge_counts_only_as_long_as_it_is_looked_at():
-    path, field = np.column_stack([np.zeros(20), np.arange(20.0)]), things(field=FIELD)
-    out = clear_of_all(path, field, side=5)
-    assert (out[MARGIN], out[NORMAL_Y]) == (5.0, -1.0)
-    assert clear_of_all(path, field)[MARGIN] == -9.0
-    out = clear_of_all(path, field, side=5, drift_m=0.5)
-    assert (out[MARGIN], out[SAMPLE]) == (2.5, 5.0)
-
-
-def test_nothing_there_is_far_away():
-    path = np.zeros((5, 2))
-    assert clear_of_obstacles(path, things(obstacle_clearance_m=1.0), drift_m=0.3)[MARGIN] == FAR
-    assert clear_of_all(path, things(), drift_m=0.3)[MARGIN] == FAR
-    assert clear_of_all(path, things(field=np.array([-1e9, -1e9, 1e9, 1e9])), drift_m=0.3)[MARGIN] == FAR

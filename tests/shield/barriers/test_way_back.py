@@ -10,7 +10,7 @@ from steerclear.shield.platforms.usv import fresh_state
 
 RADIUS_M = 8.0
 BOWS_DEG = np.linspace(-180.0, 120.0, 6)
-DEPTHS_M = (0.01, 0.1, 1.0, 3.0)
+DEPTHS_M = (0.01, 3.0)
 PLATFORMS = ("heron", "surveyor", "otter", "blueboat")
 LONG_S = 60
 

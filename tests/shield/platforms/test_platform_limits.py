@@ -32,14 +32,6 @@ def test_a_right_angle_by_command_takes_as_long_as_measured(name, seconds):
     assert steps * 0.1 == pytest.approx(seconds, abs=0.4)
 
 
-def test_a_surveyor_told_to_stop_and_turn_does_neither():
-    params, row = cruise(get_platform("surveyor"))
-    for _ in range(120):
-        step_boat(params, row, 0.0, 90.0 - row[L.HEADING], 0.1)
-    assert row[L.HEADING] == pytest.approx(43.0, abs=0.5)
-    assert math.hypot(row[L.X], row[L.Y]) == pytest.approx(26.0, abs=0.5)
-
-
 @pytest.mark.parametrize(
     ("name", "speed", "rate"),
     [
@@ -77,13 +69,6 @@ def test_thrust_is_back_in_time_from_rest_and_out_of_any_stop(name, about_s):
         step_boat(params, slowing, 0.0, 0.0, 0.1)
         worst = max(worst, seconds_to_thrust(platform, slowing.copy()))
     assert worst <= longest + 0.2
-
-
-@pytest.mark.parametrize("name", ["heron", "surveyor"])
-def test_limits_hardly_depend_on_the_step(name):
-    coarse, fine = limits_of(get_platform(name), 0.1), limits_of(get_platform(name), 0.05)
-    assert fine.half_turn_s == pytest.approx(coarse.half_turn_s, abs=0.2)
-    assert fine.turn_rate_dps == coarse.turn_rate_dps
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -13,7 +13,7 @@ from steerclear.shield.commands import Commands
 from steerclear.shield.platforms import fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.limits import cruise
-from steerclear.shield.platforms.rate import error_for_rate, rate_for_error, turn_limit
+from steerclear.shield.platforms.rate import error_for_rate, rate_for_error
 
 STEPS = Path(__file__).parents[2] / "data" / "boat_steps"
 RATE_BOATS = ("ardurover_boat", "blueboat", "otter")
@@ -25,13 +25,6 @@ RATE_BOATS = ("ardurover_boat", "blueboat", "otter")
 def test_the_error_that_asks_for_a_rate_asks_for_that_rate(name, rate):
     params = get_platform(name).pack()
     assert rate_for_error(params, error_for_rate(params, rate)) == pytest.approx(rate, abs=1e-9)
-
-
-def test_a_rudder_boat_turns_with_its_way_and_two_propellers_without():
-    rudder, propellers = get_platform("ardurover_boat"), get_platform("otter")
-    assert turn_limit(rudder.pack(), 0.0) < 3.0 < turn_limit(rudder.pack(), 1.0)
-    assert turn_limit(propellers.pack(), 0.0) > turn_limit(propellers.pack(), propellers.max_speed_mps)
-    assert rudder.max_turn_rate_at(1.0) == turn_limit(rudder.pack(), 1.0)
 
 
 def test_an_otter_stops_and_turns_as_published():

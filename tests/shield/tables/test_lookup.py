@@ -9,22 +9,27 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import RegularGridInterpolator
+from steerclear.shield.exceptions import TableError
 from steerclear.shield.tables.files import stack_tables
+from steerclear.shield.tables.grid import rho_place
 from steerclear.shield.tables.lookup import (
     LEVELS_S,
     WHOLE_S,
     full_from_m,
-    no_tables,
     table_gradient,
     table_range_m,
     table_value,
 )
-from table_scenes import random_table
+from table_scenes import problem, random_table
 
 TABLE = random_table()
+
 TABLES = stack_tables([random_table(1, other="surveyor", n_rho=5, n_beta=4), TABLE])
+
 FINITE = st.floats(-30.0, 30.0)
+
 ANGLE = st.floats(-7.0, 7.0)
+
 SPEED = st.floats(0.0, 2.0)
 
 
@@ -86,15 +91,6 @@ def test_gradients_are_those_of_finite_differences():
 
 
 @settings(max_examples=80, deadline=None)
-@given(FINITE, FINITE, ANGLE, ANGLE, SPEED, SPEED, ANGLE)
-def test_turning_the_whole_scene_changes_nothing(x, y, own, other, v, w, turn):
-    sin, cos = math.sin(turn), math.cos(turn)
-    assume(off_the_bow(x, y, own))
-    turned = table_value(TABLES, 1, WHOLE_S, x * cos + y * sin, y * cos - x * sin, own + turn, other + turn, v, w)
-    assert turned == pytest.approx(table_value(TABLES, 1, WHOLE_S, x, y, own, other, v, w), abs=1e-5)
-
-
-@settings(max_examples=80, deadline=None)
 @given(st.floats(0.01, 30.0), FINITE, ANGLE, SPEED, SPEED)
 def test_the_mirrored_scene_has_the_mirrored_gradient(x, y, other, v, w):
     star, port = (
@@ -133,11 +129,6 @@ def test_what_is_not_finite_gives_nan(place, bad):
     state[place] = bad
     assert math.isnan(table_value(TABLES, 1, WHOLE_S, *state))
     assert all(math.isnan(part) for part in table_gradient(TABLES, 1, WHOLE_S, *state))
-
-
-def test_no_tables_are_an_empty_set():
-    assert stack_tables([]).axes.shape == no_tables().axes.shape
-    assert stack_tables([]).data.size == 0
 
 
 @settings(max_examples=40, deadline=None)
@@ -182,3 +173,22 @@ def test_beyond_a_range_there_is_nothing_but_the_cap():
     assert table_value(far, 0, WHOLE_S, 0.0, from_m, 0.1, 0.2, 1.0, 1.0) == grid.cap_m
     assert table_value(far, 0, WHOLE_S, 0.0, from_m - 1e-9, 0.1, 0.2, 1.0, 1.0) == pytest.approx(grid.cap_m)
     assert math.isinf(full_from_m(TABLES, 1, WHOLE_S)) or (TABLE.values[-1] == 255).all()
+
+
+GRID = problem().grid
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.floats(0.0, 20.0))
+def test_places_and_ranges_belong_together(rho):
+    i, place = rho_place(GRID.pack(), rho)
+    ranges = GRID.ranges_m()
+    assert ranges[i] + place * (ranges[i + 1] - ranges[i]) == pytest.approx(np.clip(rho, ranges[0], ranges[-1]))
+    assert 0 <= i <= GRID.n_rho - 2
+    assert 0.0 <= place <= 1.0
+
+
+@pytest.mark.parametrize("name", ["n_rho", "n_psi", "n_beta", "n_own", "n_other"])
+def test_an_axis_of_one_node_is_refused(name):
+    with pytest.raises(TableError, match="at least 2 nodes"):
+        replace(GRID, **{name: 1})

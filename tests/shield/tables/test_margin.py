@@ -8,9 +8,9 @@ from steerclear.shield.exceptions import TableError
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.registry import get_platform
 from steerclear.shield.tables.areas import area_m2, reach_ahead_m
-from steerclear.shield.tables.duel import PURE, best_rudders, duel
+from steerclear.shield.tables.duel import PURE, duel
 from steerclear.shield.tables.files import SHIPPED, Card, pack_values, read_table, stack_tables
-from steerclear.shield.tables.make import coarser, convergence, make_table
+from steerclear.shield.tables.make import convergence, make_table
 from steerclear.shield.tables.margin import full_thrust_state, model_error, value_loss
 from steerclear.shield.tables.solve import start
 from table_scenes import problem
@@ -54,14 +54,6 @@ def test_a_head_on_from_outside_the_set_is_survived_and_from_inside_it_is_not():
     near = [duel(TABLES, 0, PARAMS, *meeting(ahead + extra), PURE, False, 2, 100) for extra in (0.1, -0.8)]
     assert near[0] >= 2.5
     assert near[1] < 2.5
-
-
-def test_the_best_rudder_turns_away():
-    own, other = meeting(6.0)
-    other[L.X] = 1.0
-    value, ours, _ = best_rudders(TABLES, 0, PARAMS, own, other, False, 2)
-    assert ours < 0.0
-    assert 2.5 < value < 6.0
 
 
 def test_runs_from_outside_the_set_keep_the_radius():
@@ -111,10 +103,3 @@ def test_an_interrupted_table_keeps_what_was_solved(tmp_path):
 def test_radii_outside_the_table_are_refused(radius):
     with pytest.raises(TableError, match=r"outside the table's 1 to 4\.8 m; choose one within"):
         make_table(problem(), (radius,))
-
-
-def test_coarser_grids_keep_their_ends():
-    one = problem(n_rho=31, n_psi=24)
-    wide = coarser(one, 1.5)
-    assert (wide.grid.n_rho, wide.grid.n_psi, wide.grid.n_own) == (21, 16, 3)
-    assert (wide.grid.rho_last_m, wide.dt_s) == (one.grid.rho_last_m, one.dt_s)

@@ -2,20 +2,18 @@
 
 import itertools
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.interpolate import RegularGridInterpolator
 from steerclear.shield.exceptions import TableError
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.platforms.registry import get_platform
 from steerclear.shield.platforms.usv import advance_hull
 from steerclear.shield.tables.files import pack_values
 from steerclear.shield.tables.grid import Grid
 from steerclear.shield.tables.lookup import LEVELS_S, pack
-from steerclear.shield.tables.moves import moves_of, sub_steps
-from steerclear.shield.tables.settings import RUDDERS, OtherMay, Problem, problem_of
+from steerclear.shield.tables.moves import sub_steps
+from steerclear.shield.tables.settings import RUDDERS, OtherMay, Problem
 from steerclear.shield.tables.solve import solve
 from table_scenes import problem, steady_car
 
@@ -126,17 +124,6 @@ def test_boats_that_cannot_turn_pass_as_geometry_says():
     assert error.max() < 0.6  # where the passing side changes the value has a kink
 
 
-def test_a_faster_turn_never_makes_it_worse_and_ahead_it_is_what_a_half_turn_needs():
-    slow, quick = (
-        replace(straight(4.0, n_psi=12, n_beta=37, n_rho=30), own=steady_car("own", 2.0, turn)) for turn in (0.0, 60.0)
-    )
-    values = [solve(one, threads=2).values for one in (slow, quick)]
-    assert (values[1] >= values[0] - 0.02).mean() > 0.99
-    head_on = [value.reshape(slow.grid.shape)[12, 6, 0, -1, -1] for value in values]
-    assert head_on[0] < 0.7
-    assert head_on[1] > 1.5
-
-
 def test_threads_change_nothing():
     one, three = (solve(problem(), threads=count).values for count in (1, 3))
     np.testing.assert_array_equal(one, three)
@@ -187,37 +174,3 @@ def test_checkpoints_of_other_problems_and_damaged_ones_are_refused(tmp_path):
         solve(problem(), checkpoint=kept)
     with pytest.raises(TableError, match=r"cannot be written .* name another with --checkpoint"):
         solve(problem(horizon_s=0.3), threads=1, checkpoint=tmp_path / "kept" / "inside")
-
-
-def test_moves_are_those_of_the_hull():
-    boat = get_platform("surveyor")
-    moves = moves_of(boat, np.array([0.0, 1.5, 3.0]), np.array(RUDDERS), 0.7)
-    for (i, speed), (j, rudder) in itertools.product(enumerate((0.0, 1.5, 3.0)), enumerate(RUDDERS)):
-        trail, turn, last = drive(boat, speed, rudder, 7)
-        np.testing.assert_allclose(moves.place_m[i, j], trail[1:], atol=1e-12)
-        assert (moves.turn_rad[i, j], moves.speed_mps[i, j]) == pytest.approx((turn, last), abs=1e-12)
-
-
-@pytest.mark.parametrize("name", ["si", "di"])
-def test_boats_without_rudder_have_no_table(name):
-    with pytest.raises(TableError, match="rolled out as pursuers instead"):
-        problem_of(name, "heron")
-
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"dt_s": 0.25}, "multiple of 0.1"),
-        ({"horizon_s": math.inf}, "finite"),
-        ({"dt_s": 0.0}, "multiple"),
-        ({"horizon_s": 0.1}, "horizon"),
-    ],
-)
-def test_settings_out_of_range_are_refused(change, words):
-    with pytest.raises(TableError, match=words):
-        replace(problem(), **change)
-
-
-def test_unknown_modes_are_refused():
-    with pytest.raises(TableError, match="choose one of worst-case, cooperative"):
-        problem_of("heron", "heron", "friendly")

@@ -43,8 +43,7 @@ def decisions(shield, fleet, seen_at):
     return np.array(told)
 
 
-@pytest.mark.parametrize("coordination", ["team", "per_boat"])
-@pytest.mark.parametrize("delay_s", [0.0, 0.3])
+@pytest.mark.parametrize(("delay_s", "coordination"), [(0.0, "team"), (0.3, "per_boat")])
 @pytest.mark.parametrize("platforms", ["heron", "surveyor"])
 def test_a_far_boat_that_flickers_changes_nothing(platforms, delay_s, coordination):
     fleet = meeting(platforms)

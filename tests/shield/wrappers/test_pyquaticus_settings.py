@@ -2,13 +2,15 @@
 
 from types import SimpleNamespace
 
+import gymnasium
 import numpy as np
 import pytest
+from steerclear import policies
 from steerclear.shield import Reason, Shield
-from steerclear.shield.exceptions import ConfigError, SteerclearError
+from steerclear.shield.exceptions import ConfigError, PolicyError, SteerclearError
 from steerclear.shield.wrappers import ShieldedParallelEnv
 from steerclear.shield.wrappers.pyquaticus import PyquaticusReader
-from test_wrappers_parallel import STRAIGHT, Quaticus
+from wrapped_games import STRAIGHT, Quaticus
 
 
 def game(**settings):
@@ -85,15 +87,6 @@ def test_a_boat_that_is_not_as_foreseen_is_refused(changed, words):
         wrap_env(env)
 
 
-def test_a_boat_that_is_as_foreseen_is_taken():
-    env = game()
-    vars(env.players["agent_1"]).update(
-        max_speed=2.0, turn_rate=60, thrust_map=np.array([[0, 40, 100], [0, 1, 2]]), dt=0.1,
-        _pid_controllers={"heading": SimpleNamespace(_kp=0.9, _kd=0.6, _ki=0.0)},
-    )  # fmt: skip
-    assert wrap_env(env).shield.config.dt_s == 0.1
-
-
 def test_boats_drawn_while_they_move_are_shielded_at_each_of_their_own_steps():
     env = game()
     for player in env.players.values():
@@ -145,18 +138,6 @@ def test_the_own_flags_circle_is_there_where_the_game_has_one():
     assert PyquaticusReader(game(flag_keepout_radius=0.0)).surroundings(1, keep_out=True).stops == ()
 
 
-def test_disabled_boats_are_not_decided_for():
-    env = game()
-    wrapped = wrap_env(env)
-    wrapped.reset(seed=0)
-    env.players["agent_0"].is_disabled = True
-    *_, infos = wrapped.step({"agent_0": STRAIGHT})
-    assert infos["agent_0"]["shield"].reason == Reason.NOT_COVERED
-    env.players["agent_0"].is_disabled = False
-    *_, infos = wrapped.step({"agent_0": STRAIGHT})
-    assert infos["agent_0"]["shield"].reason == Reason.PASSED
-
-
 class Toggling(Quaticus):
     """Disables a boat in the step itself, before it moves."""
 
@@ -196,3 +177,86 @@ def test_a_wrapped_policy_answers_pairs_only_and_where_they_are_played():
         wrap_policy(env)
     env.act_space_str["agent_0"] = "continuous"
     assert team.act({"agent_0": np.zeros(1)}, {})["agent_0"].tolist() == [2.0, 0.0]
+
+
+N_OBS = 4
+
+
+class Game(Quaticus):
+    """Observations and infos as that env gives them."""
+
+    def __init__(self):
+        super().__init__(gap_m=30.0)
+        for player in self.players.values():
+            player.get_max_speed = lambda: 2.0
+
+    def observation_space(self, agent):
+        return gymnasium.spaces.Box(-1.0, 1.0, (N_OBS,), np.float32)
+
+    def seen(self):
+        observations = {agent: np.zeros(N_OBS, np.float32) for agent in self.players}
+        state = {(agent, "pos"): np.array(player.pos) for agent, player in self.players.items()}
+        return observations, {agent: {"global_state": state, "unnorm_obs": {"x": 0.0}} for agent in self.players}
+
+
+class Agent:
+    def __init__(self, agent_id, env):
+        self.agent_id = agent_id
+
+    def compute_action(self, obs, info):
+        return (1.0, 10.0) if (self.agent_id, "pos") in info[self.agent_id]["global_state"] else None
+
+
+ENTRY = """
+class solution:
+    def compute_action(self, agent_id, full_obs_normalized, full_obs, global_state):
+        assert full_obs[agent_id] == {"x": 0.0} and len(global_state[agent_id, "pos"]) == 2
+        return 1.0, 10.0
+"""
+
+
+def model(path):
+    """A Stable-Baselines3 model that was never trained."""
+    sb3 = pytest.importorskip("stable_baselines3")
+
+    class Toy(gymnasium.Env):
+        observation_space = gymnasium.spaces.Box(-1.0, 1.0, (N_OBS,), np.float32)
+        action_space = gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32)
+
+    sb3.PPO("MlpPolicy", Toy(), n_steps=8, batch_size=8, device="cpu").save(path)
+    return f"sb3:{path}"
+
+
+def entry(folder):
+    folder.mkdir()
+    (folder / "solution.py").write_text(ENTRY)
+    return str(folder)
+
+
+KINDS = {
+    "callable": lambda place: policies.from_callable(lambda observation: (1.0, 10.0)),
+    "agents": lambda place: policies.from_agents(Agent),
+    "entry": lambda place: policies.make(entry(place / "team")),
+    "sb3": lambda place: policies.make(model(place / "model.zip")),
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.filterwarnings("default")  # of stable-baselines3 and torch
+def test_it_plays_behind_a_shield(kind, tmp_path):
+    game = Game()
+    ids = [agent for agent, player in game.players.items() if int(getattr(player.team, "value", player.team)) == 0]
+    team = Shield.for_game(game).wrap(KINDS[kind](tmp_path))
+    team.reset(game, ids, 1)
+    actions = team.act(*game.seen())
+    assert set(actions) == set(ids)
+    assert all(np.shape(action) == (2,) and np.isfinite(action).all() for action in actions.values())
+    if kind != "sb3":
+        assert [tuple(action) for action in actions.values()] == [(1.0, 10.0)] * len(ids)
+    assert team.report().failures == ()
+
+
+def test_a_scripted_policy_says_that_it_reads_our_own_game():
+    team = Shield().wrap(policies.make("medium"))
+    with pytest.raises(PolicyError, match="scripted policies need an MctfEnv, not Game"):
+        team.reset(Game(), ["agent_0"], 1)

@@ -4,23 +4,24 @@ import sys
 
 import numpy as np
 import pytest
+from gymnasium.vector import AutoresetMode
 from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
-from steerclear.shield import Reason, Shield, wrappers
-from steerclear.shield.exceptions import ConfigError
+from steerclear.shield import Reason, wrappers
+from steerclear.shield.exceptions import ConfigError, PolicyError
 from steerclear.shield.wrappers import MctfVectorEnv, TeamBatch, games_shield
 from steerclear.shield.wrappers.actions import DISCRETE
 
 GAMES = 4
 
 
-def batch(shielded=False, opponent=None, team="blue", actions="discrete", **rules):
+def batch(shielded=False, opponent=None, team="blue", actions="discrete", interval=1, **rules):
     config = GameConfig.preset("aamas2024", **rules)
     core = BatchedMctf(config, n_games=GAMES, seed=0)
     shield = games_shield(core, team=team) if shielded else None
     other = None if opponent is None else policies.make_batch(opponent)
-    return TeamBatch(core, other, team, shield, actions, seed=5)
+    return TeamBatch(core, other, team, shield, actions, seed=5, interval=interval)
 
 
 def closest_mates(games, steps=150):
@@ -78,8 +79,6 @@ def test_a_shield_for_games_takes_their_step_and_can_leave_the_flag_out():
     without.decide(core.state, commands, ours)
     assert with_flag.reason[0, boat] != Reason.PASSED
     assert without.reason[0, boat] == Reason.PASSED
-    with pytest.raises(ConfigError, match="unknown team"):
-        games_shield(core, team="green")
     with pytest.raises(ConfigError, match="build another for team 1"):
         with_flag.filter_for(1)
 
@@ -99,12 +98,6 @@ def test_the_shield_of_other_games_is_refused(games, words):
         TeamBatch(core, shield=shield)
     with pytest.raises(ConfigError, match="build the shield of these games with games_shield"):
         core.step(np.zeros((GAMES, core.n_boats, 2)), shield.filter_for(0))
-
-
-@pytest.mark.parametrize("shield", [Shield(), 5, games_shield])
-def test_what_is_no_shield_of_games_is_refused(shield):
-    with pytest.raises(ConfigError, match=r"is no shield of a batch of games; give games_shield\(core\)"):
-        TeamBatch(BatchedMctf("aamas2024", n_games=GAMES), shield=shield)
 
 
 @pytest.mark.parametrize("team", ["blue", "red"])
@@ -129,16 +122,6 @@ def test_a_step_is_the_step_of_the_games(team):
         np.testing.assert_array_equal(out.rewards, rewards[:, own].ravel())
 
 
-def test_discrete_actions_are_shares_of_top_speed_and_continuous_ones_are_taken_as_they_are():
-    by_number, by_pair = batch(), batch(actions="continuous")
-    for games in (by_number, by_pair):
-        games.reset()
-    numbers = np.arange(12)
-    by_number.step(numbers)
-    by_pair.step(DISCRETE[numbers] * [by_pair.top_speed_mps, 1.0])
-    assert by_number.core.state.tobytes() == by_pair.core.state.tobytes()
-
-
 @pytest.mark.parametrize("shielded", [False, True])
 def test_ended_games_start_anew_and_show_how_they_ended(shielded):
     games = batch(shielded, opponent="easy", max_time_s=1.0)
@@ -151,13 +134,6 @@ def test_ended_games_start_anew_and_show_how_they_ended(shielded):
         changed = (out.observations != out.final_observations).any(axis=1)
         assert (changed == ended).all()
     assert games.core.time_s == pytest.approx(0.5)
-
-
-def test_what_fits_no_batch_is_refused():
-    with pytest.raises(ConfigError, match="unknown actions 'analog'; choose one of discrete, continuous"):
-        batch(actions="analog")
-    with pytest.raises(ConfigError, match="unknown team 'green'"):
-        batch(team="green")
 
 
 @pytest.mark.parametrize("seed", [[1] * 12, -1, True, 1.5])
@@ -229,12 +205,67 @@ def test_stable_baselines_gets_what_it_asks_for():
     assert env.env_method("reset", 3, indices=0)[0].tobytes() == first.tobytes()
 
 
-def test_a_policy_of_single_games_is_no_opponent_of_a_batch():
-    core = BatchedMctf("aamas2024", n_games=1)
-    with pytest.raises(ConfigError, match=r"give steerclear\.policies\.make_batch"):
-        TeamBatch(core, policies.make("medium"))
+def drawn(seconds=1.0, games=2, **settings):
+    core = BatchedMctf(GameConfig.preset("aamas2024", max_time_s=seconds, default_start=False), n_games=games)
+    return TeamBatch(core, policies.make_batch("medium"), "blue", **settings)
 
 
-def test_a_shield_is_no_settings_for_one_of_games():
-    with pytest.raises(ConfigError, match="config is a Shield; give a ShieldConfig"):
-        games_shield(BatchedMctf("aamas2024", n_games=1), Shield())
+@pytest.mark.parametrize("value", [True, np.False_])
+@pytest.mark.parametrize("actions", ["normalised", "continuous", "discrete"])
+def test_true_and_false_are_no_actions(actions, value):
+    game = drawn(actions=actions)
+    game.reset(seed=1)
+    shape = (game.learners,) if actions == "discrete" else (game.learners, 2)
+    for given in (np.full(shape, value), np.full(shape, value).tolist(), np.full(shape, value, object)):
+        with pytest.raises(PolicyError, match="of learner 0 is not usable"):
+            game.step(given)
+
+
+def test_normalised_actions_are_the_same_commands():
+    one, two = drawn(actions="normalised"), drawn(actions="continuous")
+    one.reset(3), two.reset(3)
+    for _ in range(5):
+        left = one.step(np.tile([[0.0, 0.5]], (6, 1)))
+        right = two.step(np.tile([[0.5 * two.top_speed_mps, 90.0]], (6, 1)))
+        np.testing.assert_array_equal(left.observations, right.observations)
+
+
+def test_a_held_decision_steers_a_course():
+    from steerclear.shield.platforms import layout as L
+
+    games = drawn(60.0, interval=100, actions="continuous")
+    games.reset(1)
+    begun = games.core.state[:, :3, L.HEADING].copy()
+    games.step(np.tile([[2.0, 90.0]], (6, 1)))
+    turned = (games.core.state[:, :3, L.HEADING] - begun + 180.0) % 360.0 - 180.0
+    assert games.core.time_s[0] == pytest.approx(10.0)
+    free = ~games.core.driven[:, :3]
+    assert free.any()
+    np.testing.assert_allclose(turned[free], 90.0, atol=10.0)
+
+
+def test_a_game_that_ends_in_a_held_decision_ends_there():
+    games = drawn(1.0, interval=7)
+    games.reset(1)
+    assert not games.step(np.zeros(6, int)).truncated.any()
+    out = games.step(np.zeros(6, int))
+    assert out.truncated.all()
+    np.testing.assert_array_equal(out.episodes["l"], 2)
+    assert (out.observations != out.final_observations).any()
+    np.testing.assert_array_equal(games.core.time_s, 0.0)
+
+
+def test_infos_tell_how_a_game_ended_and_the_next_goes_on():
+    envs = MctfVectorEnv(drawn(0.2))
+    assert envs.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
+    envs.reset(seed=1)
+    stop = np.full(6, 16)
+    assert "totals" not in envs.step(stop)[-1]
+    fresh, _, terminated, truncated, infos = envs.step(stop)
+    assert (terminated | truncated).all()
+    assert infos["_totals"].all()
+    assert envs.single_observation_space.contains(infos["final_obs"][0])
+    assert (infos["final_obs"] != fresh).any()
+    np.testing.assert_array_equal(infos["totals"]["l"], 2)
+    assert not envs.step(stop)[3].any()
+    assert envs.step(stop)[3].all()

@@ -1,7 +1,6 @@
 """The shield around an environment: ours, with the shield inside the step, and one that looks like Pyquaticus'."""
 
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,9 +9,7 @@ from steerclear.env.mctf import MctfEnv
 from steerclear.shield import Reason, Shield
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.wrappers import ShieldedParallelEnv
-from steerclear.shield.wrappers.pyquaticus import PyquaticusReader
-
-STRAIGHT, STOP = 4, 16
+from wrapped_games import STRAIGHT, Quaticus
 
 
 def duel(gap_m=16.0):
@@ -68,18 +65,6 @@ def test_what_is_safe_passes_bit_for_bit():
     assert shielded.decisions[0].reason == Reason.PASSED
 
 
-def test_decisions_are_of_the_moment_they_were_made():
-    env, options = duel(35.0)
-    env = ShieldedParallelEnv(env, Shield())
-    env.reset(seed=0, options=options)
-    for _ in range(10):
-        before_deg = env.unwrapped.view().heading_deg[0]
-        *_, infos = env.step(dict.fromkeys(env.agents, 2))  # 90 deg to starboard
-        decision = infos["agent_0"]["shield"]
-        assert math.degrees(decision.nominal_heading_rad) == pytest.approx((before_deg + 90.0) % 360.0)
-        assert env.unwrapped.view().heading_deg[0] != before_deg
-
-
 @pytest.mark.parametrize("autopilot", [True, False])
 def test_boats_the_game_drives_are_covered_only_when_asked(autopilot):
     env, options = duel(35.0)
@@ -88,57 +73,6 @@ def test_boats_the_game_drives_are_covered_only_when_asked(autopilot):
     *_, infos = env.step(dict.fromkeys(env.agents, STRAIGHT))
     assert env.unwrapped.view().driven[0]
     assert (infos["agent_0"]["shield"].reason == Reason.NOT_COVERED) is not autopilot
-
-
-class Player:
-    """A boat as Pyquaticus has it."""
-
-    def __init__(self, name, team, x, y, heading):
-        self.id, self.team, self.pos, self.heading, self.speed = name, SimpleNamespace(value=team), [x, y], heading, 1.5
-        self.is_tagged = self.oob = False
-        self.state = {"thrust": 75.0, "rudder": 0.0}
-
-    def get_max_speed(self):
-        return 1.5
-
-
-class Quaticus:
-    """As much of a Pyquaticus environment as the wrapper reads; actions and commands are noted, not sailed."""
-
-    dt = 0.1
-
-    def __init__(self, gap_m):
-        self.players = {
-            "agent_0": Player("agent_0", 0, 60.0, 40.0, 90.0),
-            "agent_1": Player("agent_1", 1, 60.0 + gap_m, 40.0, -90.0),
-        }
-        self.possible_agents = self.agents = list(self.players)
-        self.dynamics, self.flag_homes = ["heron", "heron"], [(20.0, 40.0), (140.0, 40.0)]
-        self.flags = [SimpleNamespace(home=home, taken=False) for home in self.flag_homes]
-        self.act_space_checked, self.act_space_match = {}, {}
-        self.env_size, self.flag_keepout_radius, self.agent_radius = (160.0, 80.0), 3.0, [2.0, 2.0]
-        self.metadata, self.stepped, self.moved, self.current_time = {}, [], [], 0.0
-        self.aquaticus_field_points = {"HOME": (20.0, 40.0)}
-        self._walls = [[1], [2]]
-
-    @property
-    def unwrapped(self):
-        return self
-
-    def _afp_to_speed_relheading(self, action, player):
-        return 1.0, {"HOME": 180.0}[action]
-
-    def reset(self, seed=None, options=None):
-        return {}, {agent: {} for agent in self.agents}
-
-    def step(self, actions):
-        self.stepped.append(actions)
-        asked = PyquaticusReader(self).commands(actions)
-        self._move_agents({agent: np.nan_to_num(asked[i]) for i, agent in enumerate(self.agents)})
-        return {}, {}, {}, {}, {agent: {} for agent in self.agents}
-
-    def _move_agents(self, commands):
-        self.moved.append(commands)
 
 
 def test_pyquaticus_gets_the_corrected_pair_and_everything_else_as_it_was():
@@ -155,19 +89,6 @@ def test_pyquaticus_gets_the_corrected_pair_and_everything_else_as_it_was():
     assert sent["agent_0"][0] == decision.filtered_speed_mps
     turn_deg = math.degrees(decision.filtered_heading_rad - decision.nominal_heading_rad)
     assert (sent["agent_0"][1] - turn_deg + 180.0) % 360.0 == pytest.approx(180.0)
-
-
-@pytest.mark.parametrize("action", [STRAIGHT, STOP, np.array([0.7, 20.0]), "HOME"])
-def test_pyquaticus_actions_of_any_kind_are_read_and_pass_when_safe(action):
-    game = Quaticus(gap_m=70.0)
-    env = ShieldedParallelEnv(game, Shield())
-    env.reset(seed=0)
-    env.step({"agent_0": action})
-    assert game.stepped[0]["agent_0"] is action
-    asked = {STRAIGHT: (1.5, 90.0), STOP: (0.0, 90.0), "HOME": (1.0, 270.0)}
-    speed, heading = (0.7, 110.0) if isinstance(action, np.ndarray) else asked[action]
-    assert env.decisions[0].nominal_speed_mps == pytest.approx(speed)
-    assert math.degrees(env.decisions[0].nominal_heading_rad) == pytest.approx(heading)
 
 
 def test_pyquaticus_boats_that_the_game_drives_are_not_decided_for():

@@ -68,7 +68,13 @@ def test_the_decisions_are_those_of_a_shielded_env():
     assert (env.view().position[0] != start[0]).any()
 
 
-def test_what_is_wrapped_says_what_its_shield_keeps():
+def test_what_is_wrapped_says_what_its_shield_keeps_and_has_what_it_wraps():
+    team = policies.make("medium")
+    shielded = copy.copy(Shield().wrap(team))
+    shielded.reset(crowd()[0], OWN, 0)
+    assert (shielded.name, shielded.behaviours) == (f"shielded {team.name}", team.behaviours)
+    with pytest.raises(AttributeError):
+        _ = shielded.nonsense
     kept = "Shield(separation_m=4, profile='ramming', dt_s=0.1)"
     settings = {"separation_m": 4.0, "profile": "ramming"}
     assert repr(Shield(**settings).wrap(policies.make("medium"))) == f"<shielded medium: {kept}>"
@@ -76,17 +82,6 @@ def test_what_is_wrapped_says_what_its_shield_keeps():
     env = repr(ShieldedParallelEnv(crowd()[0], Shield(**settings), team="red"))
     assert env.startswith("<ShieldedParallelEnv of red in ")
     assert env.endswith(f": {kept}>")
-
-
-def test_attributes_of_the_policy_are_within_reach_and_it_can_be_copied():
-    team = policies.make("medium")
-    shielded = Shield().wrap(team)
-    assert shielded.name == f"shielded {team.name}"
-    shielded.reset(crowd()[0], OWN, 0)
-    assert shielded.behaviours == team.behaviours
-    assert copy.copy(shielded).name == shielded.name
-    with pytest.raises(AttributeError):
-        _ = shielded.nonsense
 
 
 def test_misuse_is_refused():
@@ -106,6 +101,10 @@ def test_misuse_is_refused():
         Shield().wrap("medium")
     with pytest.raises(ConfigError, match="read is 5; give a function"):
         Shield().wrap(lambda seen: None, read=5)
+    with pytest.raises(ConfigError, match=r"ScriptedTeam is a class; give a policy: ScriptedTeam\(...\)"):
+        Shield().wrap(type(policies.make("medium")))
+    with pytest.raises(ConfigError, match=r"read= is for plain functions; .* leave it out"):
+        Shield().wrap(policies.make("medium"), read=near)
     for shield in (5, Shield, None, games_shield(BatchedMctf("aamas2024", n_games=1))):
         with pytest.raises(ConfigError, match="is no shield of one game; give"):
             ShieldedTeamPolicy(straight(), shield)
@@ -146,6 +145,15 @@ def test_a_function_that_fails_holds_the_boats(answer, caplog):
     assert ("broken" in caplog.text) == (answer is ValueError)
 
 
+def test_a_command_that_is_not_finite_holds_its_boat_and_the_log_says_whose(caplog):
+    answers = iter([[[2.0, 0.0], [np.nan, 0.0]], *[[[bad, 0.0], [2.0, 0.0]] for bad in (np.nan, np.inf, 2.0)]])
+    team = Shield().wrap(lambda gap_m: Commands.absolute_rad(next(answers)), read=near)
+    reasons = [(team(60.0), team.decisions["boat_0"].reason)[1] for _ in range(4)]
+    assert reasons == [Reason.PASSED, Reason.HELD, Reason.HELD, Reason.PASSED]
+    said = [record.message for record in caplog.records]
+    assert said == ["policy failed: commands of 'boat_0' are not finite; they hold", "policy answers again"]
+
+
 def test_a_function_that_fails_is_answered_for_in_its_own_frame(caplog):
     """Absolute headings sent on as they are: a relative one among them would turn the boats."""
     answers = [None, Commands.absolute_rad([[2.0, 0.0], [2.0, np.pi]]), None, None, "no", None, None]
@@ -158,27 +166,6 @@ def test_a_function_that_fails_is_answered_for_in_its_own_frame(caplog):
     failed = [record.message for record in caplog.records if "failed" in record.message]
     assert len(failed) == 4, "once when it begins, and when it becomes another"
     assert sum("answers again" in record.message for record in caplog.records) == 2
-
-
-def test_commands_that_are_not_finite_hold_their_boats_and_the_log_says_whose(caplog):
-    answers = iter(
-        [[[2.0, 0.0], [np.nan, 0.0]], [[np.nan, 0.0], [2.0, 0.0]], [[np.inf, 0.0], [2.0, 0.0]], [[2.0, 0.0]] * 2]
-    )
-    team = Shield().wrap(lambda gap_m: Commands.absolute_rad(next(answers)), read=near)
-    reasons = []
-    for _ in range(4):
-        team(60.0)
-        reasons.append(team.decisions["boat_0"].reason)
-    assert reasons == [Reason.PASSED, Reason.HELD, Reason.HELD, Reason.PASSED]
-    said = [record.message for record in caplog.records]
-    assert said == ["policy failed: commands of 'boat_0' are not finite; they hold", "policy answers again"]
-
-
-def test_a_class_is_no_policy_and_a_team_policy_is_not_read():
-    with pytest.raises(ConfigError, match=r"ScriptedTeam is a class; give a policy: ScriptedTeam\(...\)"):
-        Shield().wrap(type(policies.make("medium")))
-    with pytest.raises(ConfigError, match=r"read= is for plain functions; .* leave it out"):
-        Shield().wrap(policies.make("medium"), read=near)
 
 
 def test_a_policy_that_answers_nothing_is_told_what_to_answer():

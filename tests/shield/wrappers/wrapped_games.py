@@ -2,6 +2,7 @@
 
 import hashlib
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 from steerclear import policies
@@ -10,8 +11,9 @@ from steerclear.env.core import BatchedMctf
 from steerclear.env.mctf import MctfEnv
 from steerclear.shield import Shield
 from steerclear.shield.wrappers import MctfVectorEnv, ShieldedParallelEnv, TeamBatch, games_shield
+from steerclear.shield.wrappers.pyquaticus import PyquaticusReader
 
-GAMES = 2
+GAMES, STRAIGHT = 2, 4
 SMALL = GameConfig.preset("aamas2024", default_start=False, env_bounds_m=(40.0, 24.0), max_time_s=30.0)
 """Boats are in each other's way from the start: shields have work."""
 
@@ -102,3 +104,54 @@ KINDS = {
     "gymnasium": lambda: Batch(MctfVectorEnv),
 }
 """Every wrapper that needs no extra, by name."""
+
+
+class Player:
+    """A boat as Pyquaticus has it."""
+
+    def __init__(self, name, team, x, y, heading):
+        self.id, self.team, self.pos, self.heading, self.speed = name, SimpleNamespace(value=team), [x, y], heading, 1.5
+        self.is_tagged = self.oob = False
+        self.state = {"thrust": 75.0, "rudder": 0.0}
+
+    def get_max_speed(self):
+        return 1.5
+
+
+class Quaticus:
+    """As much of a Pyquaticus environment as the wrapper reads; actions and commands are noted, not sailed."""
+
+    dt = 0.1
+
+    def __init__(self, gap_m):
+        self.players = {
+            "agent_0": Player("agent_0", 0, 60.0, 40.0, 90.0),
+            "agent_1": Player("agent_1", 1, 60.0 + gap_m, 40.0, -90.0),
+        }
+        self.possible_agents = self.agents = list(self.players)
+        self.dynamics, self.flag_homes = ["heron", "heron"], [(20.0, 40.0), (140.0, 40.0)]
+        self.flags = [SimpleNamespace(home=home, taken=False) for home in self.flag_homes]
+        self.act_space_checked, self.act_space_match = {}, {}
+        self.env_size, self.flag_keepout_radius, self.agent_radius = (160.0, 80.0), 3.0, [2.0, 2.0]
+        self.metadata, self.stepped, self.moved, self.current_time = {}, [], [], 0.0
+        self.aquaticus_field_points = {"HOME": (20.0, 40.0)}
+        self._walls = [[1], [2]]
+
+    @property
+    def unwrapped(self):
+        return self
+
+    def _afp_to_speed_relheading(self, action, player):
+        return 1.0, {"HOME": 180.0}[action]
+
+    def reset(self, seed=None, options=None):
+        return {}, {agent: {} for agent in self.agents}
+
+    def step(self, actions):
+        self.stepped.append(actions)
+        asked = PyquaticusReader(self).commands(actions)
+        self._move_agents({agent: np.nan_to_num(asked[i]) for i, agent in enumerate(self.agents)})
+        return {}, {}, {}, {}, {agent: {} for agent in self.agents}
+
+    def _move_agents(self, commands):
+        self.moved.append(commands)

@@ -1,26 +1,27 @@
 """The competition's entrants: they play either side under every preset, alike when seeded alike, as their row says."""
 
 import math
-from itertools import pairwise
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from steerclear import policies
-from steerclear.env.config import PRESETS
+from steerclear.env.arrays import make_rules
+from steerclear.env.config import PRESETS, GameConfig
+from steerclear.env.core import BatchedMctf
+from steerclear.env.field import field_geometry
 from steerclear.env.mctf import MctfEnv
 from steerclear.policies.entrants import catalogue, plane
-from steerclear.policies.entrants.chao import GridProblem, search
-from steerclear.policies.entrants.lucas import home_of
+from steerclear.policies.entrants.lucas import hints_for, home_of
 from steerclear.policies.entrants.plane import row
 from steerclear.policies.entrants.play import EntrantTeam
 from steerclear.policies.entrants.sight import Boat, look
+from steerclear.policies.evolution import N_MOVES, STOP, copy_game, evolve, make_desk, roll_out, worth_of
 from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.foreign import load_others
 
 SIDES = {"blue": slice(0, 3), "red": slice(3, 6)}
-FLAG = frozenset({(13, 3), (13, 4), (12, 3), (12, 4)})
 
 
 def play(name, preset="aamas2024", side="blue", steps=30, seed=2, **options):
@@ -69,14 +70,6 @@ def test_red_plays_as_blue_turned_round(name):
     np.testing.assert_allclose(found[0], found[1], atol=1e-9)
 
 
-def test_ohto_holds_near_its_base_and_never_grabs():
-    _, env = play("ohto", steps=900)
-    before = env.core.state[0, :3, :2].copy()
-    assert (np.linalg.norm(before - env.core.flag_home[0], axis=1) < 20.0).all()
-    assert (env.core.state[0, :3, 3] < 0.05).all()
-    assert env.core.grabs.sum() == 0
-
-
 @pytest.mark.parametrize("preset", PRESETS)
 def test_ohto_holds_the_row_in_which_the_presets_start_boats(preset):
     """Also where a game starts them elsewhere, in disorder and bunched beside the flag: no way is left open."""
@@ -118,44 +111,6 @@ def test_a_meeting_point_is_reached_at_the_same_moment_by_both(x, y, heading, sp
     assert plane.distance((x + time_s * target.velocity[0], y + time_s * target.velocity[1]), point) < 1e-6
 
 
-def problems(number=25):
-    rng = np.random.default_rng(3)
-    for _ in range(number):
-        start = (int(rng.integers(8)), int(rng.integers(8)))
-        cells = {(int(c), int(r)) for c, r in zip(rng.integers(8, 16, 14), rng.integers(0, 8, 14), strict=True)}
-        yield GridProblem(start, False, FLAG, 8, frozenset({(5, 9)}), frozenset(cells))
-
-
-def test_a_way_leads_over_the_flag_and_home_through_open_cells():
-    found = 0
-    for problem in problems():
-        way = search(problem)
-        if way is not None:
-            found += 1
-            steps = [problem.start, *way]
-            assert all(abs(a[0] - b[0]) + abs(a[1] - b[1]) == 1 for a, b in pairwise(steps))
-            assert all(problem.is_open(cell) for cell in way)
-            assert FLAG & set(way)
-            assert way[-1][0] < problem.own
-    assert found > 5
-
-
-@pytest.mark.parametrize(
-    ("name", "options", "text"),
-    [
-        ("lucas", {"population": 1}, "population is 1; give a whole number from 2"),
-        ("lucas", {"horizon": 2.5}, "horizon is 2.5"),
-        ("chao", {"planner": "fast"}, "choose from auto, astar"),
-        ("chao", {"contact_m": math.nan}, "give a distance"),
-        ("options", {"boats": "attack,run"}, "unknown option 'run'; choose from attack"),
-        ("ohto", {"speed": 1}, "has no option 'speed'"),
-    ],
-)
-def test_bad_options_are_refused_with_what_to_give(name, options, text):
-    with pytest.raises(PolicyError, match=text):
-        policies.make(name, **options)
-
-
 def test_an_entrant_plays_a_whole_team_of_a_game():
     env = MctfEnv("aamas2024")
     env.reset(seed=1)
@@ -163,6 +118,8 @@ def test_an_entrant_plays_a_whole_team_of_a_game():
         policies.make("ohto").reset(env, ["agent_0"], 0)
     with pytest.raises(PolicyError, match="has no game; call reset"):
         policies.make("meo").act({}, {})
+    with pytest.raises(PolicyError, match="was not reset for team 0"):
+        policies.make_batch("lucas").act(BatchedMctf("mctf2025"), 0)
 
 
 def test_a_newcomer_is_a_policy_by_name(monkeypatch):
@@ -245,10 +202,78 @@ def test_a_carrier_takes_the_flag_to_the_nearer_corner_where_it_counts_there(nam
     assert (heading - towards + 180.0) % 360.0 - 180.0 == pytest.approx(0.0, abs=1e-6)
 
 
-def test_lucas_plans_home_to_a_corner_and_in_decisions_of_a_second():
-    env = MctfEnv("mctf2026")
-    env.reset(seed=1, options={"init_dict": {"agent_position": {"agent_1": (60.0, 60.0)}}})
-    team = policies.make("lucas", population=2, generations=1, horizon=2)
-    team.reset(env, env.possible_agents[SIDES["blue"]], 1)
-    assert team.dt_s == 1.0
-    np.testing.assert_allclose(home_of(env.core, 0, 1), (10.0, 70.0))
+HORIZON = 8
+
+
+def scenes(config, every=40, steps=400):
+    """A live game of `medium` against `hard`, every so many steps."""
+    core = BatchedMctf(config, n_games=2, seed=4)
+    teams = [policies.make_batch("medium"), policies.make_batch("hard")]
+    for team, policy in enumerate(teams):
+        policy.reset(core, team, 1)
+    half = config.team_size
+    commands = np.zeros((2, 2 * half, 2))
+    for step in range(steps):
+        if step % every == 0:
+            yield core
+        commands[:, :half], commands[:, half:] = teams[0].act(core, 0), teams[1].act(core, 1)
+        core.step(commands)
+
+
+@pytest.mark.parametrize(
+    "config",
+    [
+        GameConfig.preset("mctf2025", default_start=False, dt_s=0.2),
+        GameConfig.preset("aamas2024", default_start=False, tag_probability=0.5),
+        GameConfig.preset("mctf2025", default_start=False, decision_steps=10),
+        GameConfig.preset("mctf2025", default_start=False, obstacles={"circle": [(6.0, (60.0, 40.0))]}),
+    ],
+    ids=["2025", "chance", "long decisions", "obstacle"],
+)
+def test_what_a_search_found_is_worth_what_a_whole_rollout_says(config):
+    rules, rng = make_rules(config, field_geometry(config)), np.random.default_rng(3)
+    desk, whole = (make_desk(config, 10, 3, HORIZON, 1.2) for _ in range(2))
+    changed, tagged = 0, 0
+    for number, core in enumerate(scenes(config)):
+        game, boat = number % 2, number % core.n_boats
+        plans = rng.integers(0, N_MOVES, (core.n_boats, HORIZON))
+        before, home = plans.copy(), home_of(core, int(core.team[boat]), boat, game)
+        hints = hints_for(core, boat, home, game)
+        found = evolve(rules, core.games, game, plans, boat, hints, home, rng, desk)
+        copy_game(whole.marks, 0, core.games, game)
+        roll_out(rules, whole, plans, boat, 0, True)
+        assert found == worth_of(rules, whole, boat, home)
+        others = np.arange(core.n_boats) != boat
+        assert (plans[others] == before[others]).all()
+        roll_out(rules, whole, before, boat, 0, True)
+        assert found >= worth_of(rules, whole, boat, home)
+        changed += bool((plans != before).any())
+        tagged += int(core.is_tagged.sum())
+    assert changed > 5
+    assert tagged > 0
+
+
+def test_a_game_of_a_batch_is_played_as_a_single_one_and_only_those_asked_for():
+    config = GameConfig.preset("mctf2025", default_start=False)
+    core = BatchedMctf(config, n_games=3, seed=7)
+    options = {"population": 4, "generations": 2, "horizon": 5}
+    batch = policies.make_batch("lucas", **options)
+    batch.reset(core, 1, 20)
+    batch.plays(np.array([False, False, True]))
+    env = MctfEnv(config, action_kind="continuous")
+    env.reset(seed=0)
+    team = policies.make("lucas", **options)
+    ids = env.possible_agents[3:]
+    commands, moved = np.zeros((3, 6, 2)), False
+    for step in range(40):
+        env.core.restore(core.view(2))
+        if step == 0:
+            team.reset(env, ids, 22)
+        single = team.act({}, {})
+        commands[:, 3:] = batch.act(core, 1)
+        np.testing.assert_allclose(commands[2, 3:], [single[name] for name in ids], atol=1e-9)
+        moved = moved or bool((commands[2, 3:, 0] > 0.0).any())
+        core.step(commands)
+    assert moved
+    assert (batch._plans[:2] == STOP).all()
+    assert len(batch.think_times_s) == 4  # one at once for all boats, then one each 1.2 s
