@@ -1,7 +1,5 @@
 """Pages: links and anchors lead somewhere, every page is in the site, and the site builds without a warning."""
 
-import importlib.util
-import inspect
 import re
 import shutil
 import subprocess
@@ -33,51 +31,6 @@ def anchors_of(page):
     return {re.sub(r"[^\w\- ]", "", head.lower()).strip().replace(" ", "-") for head in heads}
 
 
-MOST_LINES = 30
-"""Of an example that stands on a page as a whole."""
-
-
-def program_of(example):
-    """An example's text without its docstring."""
-    return example.read_text(encoding="utf-8").split('"""', 2)[2].lstrip("\n")
-
-
-def shown_programs():
-    """(example, the program that stands on a page below the link to it) of all pages."""
-    for page in DOCS.rglob("*.md"):
-        text = page.read_text(encoding="utf-8")
-        for name, shown in re.findall(r"\(examples/(\w+\.py)\)[^\n]*\n\n```python\n(.*?)^```$", text, re.M | re.S):
-            yield DOCS / "examples" / name, shown
-
-
-def test_programs_on_pages_are_the_examples_that_are_run():
-    whole = set()
-    for example, shown in shown_programs():
-        assert shown in program_of(example), example.name
-        whole |= {example.name} if shown == program_of(example) else set()
-    short = {
-        example.name
-        for example in (DOCS / "examples").glob("*.py")
-        if len(program_of(example).splitlines()) <= MOST_LINES
-    }
-    assert short <= whole
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
-def test_blocks_of_code_end_on_a_line_of_their_own(page):
-    """A formatter that runs a block's lines together leaves all that follows in it."""
-    text = page.read_text(encoding="utf-8")
-    fences = re.findall(r"^ *```.*$", text, flags=re.MULTILINE)
-    assert len(fences) == text.count("```")
-    assert all(fence.strip() == "```" for fence in fences[1::2])
-
-
-def test_every_example_is_on_some_page():
-    text = "".join(page.read_text(encoding="utf-8") for page in DOCS.rglob("*.md"))
-    for example in (DOCS / "examples").glob("*.py"):
-        assert f"(examples/{example.name})" in text, example.name
-
-
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
 def test_links_lead_somewhere(page):
     for link in LINK.findall(text_of(page)):
@@ -89,6 +42,37 @@ def test_links_lead_somewhere(page):
             continue
         assert target.exists(), link
         assert not anchor or anchor in anchors_of(target), link
+
+
+def test_programs_on_pages_are_the_examples_that_are_run():
+    """Each example is on some page: short ones as a whole, of others a part or a link."""
+    whole, linked = set(), ""
+    for page in DOCS.rglob("*.md"):
+        text = page.read_text(encoding="utf-8")
+        linked += text
+        for name, shown in re.findall(r"\(examples/(\w+\.py)\)[^\n]*\n\n```python\n(.*?)^```$", text, re.M | re.S):
+            program = program_of(DOCS / "examples" / name)
+            assert shown in program, name
+            whole |= {name} if shown == program else set()
+    for example in (DOCS / "examples").glob("*.py"):
+        assert f"(examples/{example.name})" in linked, example.name
+        assert example.name in whole or len(program_of(example).splitlines()) > 30, example.name
+
+
+def program_of(example):
+    """An example's text without its docstring."""
+    return example.read_text(encoding="utf-8").split('"""', 2)[2].lstrip("\n")
+
+
+def test_blocks_of_code_end_on_a_line_of_their_own_and_a_page_has_a_next_step():
+    """A formatter that runs a block's lines together leaves all that follows in it."""
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        fences = re.findall(r"^ *```.*$", text, flags=re.MULTILINE)
+        assert len(fences) == text.count("```"), page
+        assert all(fence.strip() == "```" for fence in fences[1::2]), page
+        if page.parent == DOCS and page.name != "README.md":
+            assert re.search(r"^(Next: |## (\d+\. )?On from here)", text, flags=re.MULTILINE), page
 
 
 def test_a_link_and_an_anchor_are_found():
@@ -108,15 +92,6 @@ def test_every_page_is_in_the_site():
     assert sorted(nav_pages(nav)) == sorted(
         GENERATED | {page.relative_to(DOCS).as_posix() for page in DOCS.rglob("*.md")}
     )
-
-
-HAND_WRITTEN = [page for page in sorted(DOCS.glob("*.md")) if page.name != "README.md"]
-
-
-@pytest.mark.parametrize("page", HAND_WRITTEN, ids=lambda page: page.name)
-def test_a_page_has_a_next_step(page):
-    text = page.read_text(encoding="utf-8")
-    assert re.search(r"^(Next: |## (\d+\. )?On from here)", text, flags=re.MULTILINE), page.name
 
 
 def test_troubleshooting_has_texts_that_are_said():
@@ -146,13 +121,6 @@ RETIRED = {
 """Words of earlier versions, and what the glossary has in their place."""
 
 
-@pytest.mark.parametrize("page", [ROOT / "README.md", *sorted(DOCS.glob("*.md"))], ids=lambda page: page.name)
-def test_retired_words_stay_out(page):
-    text = text_of(page).replace("barrier certificates", "")
-    found = {word: instead for word, instead in RETIRED.items() if re.search(word, text, flags=re.IGNORECASE)}
-    assert not found, f"{page.name}: say instead {found}"
-
-
 def helps(command, path="steerclear"):
     """(command, its help) of all commands."""
     yield path, " ".join([command.help or "", *(str(getattr(each, "help", "") or "") for each in command.params)])
@@ -160,45 +128,13 @@ def helps(command, path="steerclear"):
         yield from helps(each, f"{path} {name}")
 
 
-@pytest.mark.parametrize(("command", "text"), [*helps(typer.main.get_command(app))])
-def test_retired_words_stay_out_of_help(command, text):
-    found = {word: instead for word, instead in RETIRED.items() if re.search(word, text, flags=re.IGNORECASE)}
-    assert not found, f"{command}: say instead {found}"
-
-
-def public_docstrings():
-    """(name, docstring) of all that docs/api.md names, and of its public methods."""
-    for name in sorted(
-        set(re.findall(r"^::: (\S+)", (DOCS / "api.md").read_text(encoding="utf-8"), flags=re.MULTILINE))
-    ):
-        module, _, last = name.rpartition(".")
-        found = importlib.import_module(name) if find_spec_of(name) else getattr(importlib.import_module(module), last)
-        members = vars(found).items() if inspect.isclass(found) or inspect.ismodule(found) else ()
-        yield name, inspect.getdoc(found) or ""
-        for key, member in members:
-            if not key.startswith("_") and (
-                inspect.isroutine(member) or inspect.isclass(member) or isinstance(member, property)
-            ):
-                yield f"{name}.{key}", inspect.getdoc(member) or ""
-
-
-def find_spec_of(name):
-    try:
-        return importlib.util.find_spec(name)
-    except ModuleNotFoundError:  # a name in a module
-        return None
-
-
-def test_retired_words_stay_out_of_public_docstrings():
-    """But for `Barrier.slope`, a public name, and what stands in code marks."""
-    said = {name: re.sub(r"`[^`\n]*`", "", text) for name, text in public_docstrings()}
-    words = {word: instead for word, instead in RETIRED.items() if "slope" not in word}
-    found = {
-        name: [instead for word, instead in words.items() if re.search(word, text, flags=re.IGNORECASE)]
-        for name, text in said.items()
-    }
-    assert len(said) > 40
-    assert not {name: instead for name, instead in found.items() if instead}
+def test_retired_words_stay_out_of_pages_and_help():
+    told = {page.name: text_of(page) for page in (ROOT / "README.md", *DOCS.glob("*.md"))}
+    told |= dict(helps(typer.main.get_command(app)))
+    for where, text in told.items():
+        text = text.replace("barrier certificates", "")
+        found = {word: instead for word, instead in RETIRED.items() if re.search(word, text, flags=re.IGNORECASE)}
+        assert not found, f"{where}: say instead {found}"
 
 
 def test_the_site_builds_without_a_warning(tmp_path):
@@ -221,8 +157,3 @@ def test_the_site_builds_without_a_warning(tmp_path):
     assert "arithmatex" not in pages["shield.html"]
     assert "ShieldedParallelEnv" in pages["api.html"]
     assert "check_platform(" in pages["extend.html"]
-
-
-def test_times_of_decisions_stand_where_a_quiet_machine_measured_them():
-    for page in sorted((DOCS / "studies").glob("ablation_*.md")):
-        assert "decision p" not in page.read_text(encoding="utf-8"), page

@@ -1,4 +1,4 @@
-"""Every example runs as it stands and prints what it is about."""
+"""Every example, and the README's code, runs as it stands and prints what is said of it."""
 
 import re
 import runpy
@@ -87,3 +87,10 @@ def test_examples_are_short():
     for path in EXAMPLES.glob("*.py"):  # those that draw the docs' figures have lines of axes and labels besides
         most = 90 if path.stem.startswith("draw_") else 45
         assert len(path.read_text(encoding="utf-8").splitlines()) <= most, path.name
+
+
+def test_the_readme_prints_what_it_says(capsys):
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    decision, game = re.findall(r"```python\n(.*?)```", readme, flags=re.DOTALL)
+    assert decided(decision, capsys) == re.search(r"## One decision.*?```text\n(.*?)\n```", readme, re.DOTALL).group(1)
+    assert decided(game, capsys) == re.search(r"\.reason\.name\)  # (\w+);", game).group(1)

@@ -5,17 +5,9 @@ import numpy as np
 import pytest
 from json_keys import KEYS, undocumented
 from steerclear.experiments.bench import POLICIES, BenchSettings, bench_goals, bench_tables, run_bench
-from steerclear.experiments.bench_measures import (
-    BatchSize,
-    decide_times,
-    programs_of,
-    questions_of_games,
-    solver_times,
-)
+from steerclear.experiments.bench_measures import BatchSize, solver_times
 from steerclear.experiments.docs import write_pages
 from steerclear.experiments.result_files import finite, write_json
-from steerclear.shield import ShieldConfig
-from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.filter.program import Program
 
 TINY = replace(
@@ -105,14 +97,6 @@ def test_goals_judge_the_slowest_policy_without_a_shield_and_medium_with_one(con
     assert [goal["value"] for goal in goals[4:9]] == pytest.approx([2e5, 8.5e4, 1.9, 8.5e4, 1.9])
 
 
-def test_times_are_split_by_what_the_shield_did():
-    games = questions_of_games("aamas2024", 20.0, 0, ShieldConfig())
-    times = decide_times(games, ShieldConfig(), 1)
-    assert 0.0 < times["share_intervening"] < 0.5
-    assert times["passes"]["p50_us"] < times["intervenes"]["p50_us"]
-    assert programs_of(games, ShieldConfig(), 3, 0)
-
-
 def test_solvers_are_held_against_each_other_on_the_same_programs():
     rows = np.array([[1.0, 0.0], [0.0, 1.0]])
     feasible = Program(rows, np.array([1.0, -2.0]), np.array([0.5, 0.5]))
@@ -121,37 +105,3 @@ def test_solvers_are_held_against_each_other_on_the_same_programs():
     assert times["daqp"]["ratio"] == 1.0
     assert times["daqp"]["solved"] == times["osqp"]["solved"] == times["active set (baselines)"]["solved"] == 0.5
     assert max(row["differs"] for row in times.values() if row["differs"] is not None) < 1e-3
-
-
-def test_the_page_of_keys_holds_every_key(tmp_path):
-    write_pages([], tmp_path)
-    text = (tmp_path / "json_keys.md").read_text()
-    assert all(f"`{key}`" in text for keys in KEYS.values() for key in keys)
-
-
-def test_every_key_of_changed_commands_says_whether_it_is_a_fraction_or_percent():
-    tables = KEYS.values()
-    found = {key: words for keys in tables for key, words in keys.items() if "changed_share" in key}
-    assert any("metrics" in key for key in found)
-    assert any("metrics" not in key for key in found)
-    for key, words in found.items():
-        assert ("%" in words) == ("metrics" in key), key
-        assert ("0 to 1" in words) == ("metrics" not in key), key
-
-
-def test_no_page_is_made_of_other_results(tmp_path):
-    with pytest.raises(
-        ConfigError, match="ablate, evaluate, tournament, bench, encounters, reach compare, reach play or train-study"
-    ):
-        write_pages([{"command": "parity"}], tmp_path)
-    (tmp_path / "file").write_text("")
-    with pytest.raises(ConfigError, match="choose another --out"):
-        write_pages([], tmp_path / "file" / "docs")
-
-
-def test_no_page_is_written_over_another(tmp_path):
-    settings = {"preset": "aamas2024", "own": "medium", "games": 1, "rules": {}}
-    about = {"quick": False, "seeds": [0], "versions": {"steerclear": "1"}, "goals": []}
-    games = {"command": "evaluate", "settings": settings, "pairings": [], **about}
-    with pytest.raises(ConfigError, match=r"two of the results make evaluation_aamas2024\.md; give them one at a time"):
-        write_pages([games, games], tmp_path)

@@ -2,6 +2,7 @@
 
 import errno
 import json
+import math
 import os
 import re
 import signal
@@ -38,11 +39,18 @@ def test_commands_and_options_stay():
 TINY = ["ablate", "--opponents", "easy", "--games", "2", "--max-time", "40", "--seed", "3", "--jobs", "1"]
 FIGURES = {
     "tags": (2.0, 2.0, 2.0),
+    "tags_against": (2.0, 2.0, 2.0),
     "breaches_teammate_2.5m": (2.0, 0.0, 0.0),
     "breaches_teammate_4.0m": (2.0, 1.0, 2.5),
+    "breaches_driven_4.0m": (1.5, 1.0, 2.5),
+    "clean_games": (0.0, 1.0, 1.0),
     "closest_m": (0.9098, 3.5511, 3.1749),
+    "closest_of_all_m": (0.1879, 3.4758, 2.7234),
     "changed_share": (None, 3.2193, 4.7083),
+    "mean_heading_change_deg": (None, 81.1675, 68.8404),
+    "mean_speed_change_mps": (None, 0.0, 0.0274),
     "reversals_per_boat_minute": (39.75, 47.5, 38.0),
+    "collisions": (4.0, 0.0, 0.0),
     "primary": (-1.0, 0.0, 0.0),
 }
 """Off, on and covered; those of off and covered are version 0.8.0's, whose "on" covered."""
@@ -62,6 +70,11 @@ def test_the_same_seeds_give_the_same_figures_and_files(tmp_path, monkeypatch):
     metrics = content["pairings"][0]["metrics"]
     found = {key: tuple(metrics[key].get(s, {}).get("value") for s in ("off", "on", "covered")) for key in FIGURES}
     assert found == {key: pytest.approx(values, abs=5e-4) for key, values in FIGURES.items()}
+    change, hits = metrics["closest_m"]["difference"], metrics["breaches_teammate_2.5m"]["on"]
+    assert [change[part] for part in ("value", "low", "high")] == pytest.approx([2.6413, 1.9946, 3.2879], abs=5e-4)
+    assert (hits["low"], hits["high"], hits["n"]) == (0.0, pytest.approx(-math.log(0.05) / 2), 2)
+    reasons = {name: count for name, count in content["pairings"][0]["reasons"].items() if count}
+    assert reasons == {"PASSED": 1924, "LEAST_CHANGE": 34, "BACKUP": 28, "BEST_EFFORT": 2}
     assert {path.name for path in Path("out").iterdir()} - {".lock"} == {
         *("experiment.json", "rows.jsonl", "results.json", "report.html", "replay.html"), content["files"]["games"],
     }  # fmt: skip
@@ -99,7 +112,8 @@ def test_a_tournament_of_fixed_seeds(tmp_path, monkeypatch):
     assert json.loads(Path("out/results.json").read_text())["games_resumed"] == content["games_played"]
 
 
-ENDS = {"SIGINT": ExitCode.INTERRUPTED, "SIGTERM": ExitCode.INTERRUPTED, "SIGKILL": -9}
+ENDS = {"SIGINT": ExitCode.INTERRUPTED, "SIGKILL": -9}
+"""SIGTERM is sent where foreign code plays (entries/test_entries_commands.py) and to a training."""
 
 
 def _heed_ctrl_c():
@@ -107,37 +121,48 @@ def _heed_ctrl_c():
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="sends POSIX signals")
+def children_of(pid):
+    return Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="sends POSIX signals, looks into /proc")
 def test_however_a_run_ends_what_is_finished_is_kept_and_gone_on_with(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    begin = ["ablate", "--opponents", "hold", "--max-time", "20", "--no-shield-autopilot", "--judge", "none", "--games"]
-    command, running = [sys.executable, "-m", "steerclear.experiments.cli", *begin, "400"], {}
-    for name in ENDS:  # all at once: most of their time they load
-        jobs = ["--jobs", "2" if name == "SIGINT" else "1", "--out", name]
-        running[name] = subprocess.Popen([*command, *jobs], stderr=subprocess.PIPE, preexec_fn=_heed_ctrl_c)
-    waiting, deadline = dict(running), time.monotonic() + 300.0
-    while waiting and time.monotonic() < deadline:
-        for name, process in list(waiting.items()):
-            lines = tmp_path / name / "rows.jsonl"
-            if lines.exists() and lines.read_bytes().count(b"\n") >= 2:
-                waiting.pop(name)
-                process.send_signal(getattr(signal, name))
-        time.sleep(0.1)
-    assert not waiting
+    begin = ["ablate", "--opponents", "hold", "--max-time", "4", "--no-shield-autopilot", "--judge", "none", "--games"]
+    command = [sys.executable, "-m", "steerclear.experiments.cli", *begin, "4000"]
+    running = {
+        name: subprocess.Popen(
+            [*command, "--jobs", jobs, "--out", name], stderr=subprocess.PIPE, preexec_fn=_heed_ctrl_c
+        )
+        for name, jobs in (("SIGINT", "1"), ("SIGKILL", "2"))
+    }
+    for name, process in running.items():
+        lines, deadline = tmp_path / name / "rows.jsonl", time.monotonic() + 300.0
+        while not (lines.exists() and lines.read_bytes().count(b"\n") >= 2):
+            assert time.monotonic() < deadline
+            time.sleep(0.1)
+        busy = run(*begin, "2", "--jobs", "1", "--out", name, "--resume")
+        assert "is being written to by another process; wait until it is done" in busy.stderr
+        workers = children_of(process.pid)
+        process.send_signal(getattr(signal, name))
+        assert len(workers) >= (2 if name == "SIGKILL" else 0)
+        while any(Path(f"/proc/{pid}/exe").exists() for pid in workers):
+            assert time.monotonic() < deadline, "no worker is left"
+            time.sleep(0.1)
+    whole = run(*begin, "2", "--jobs", "1", "--out", "whole")
+    assert whole.exit_code == ExitCode.OK, whole.output
+    expected = json.loads(Path("whole", "results.json").read_text())
     for name, process in running.items():
         _, errors = process.communicate(timeout=300.0)
         assert process.returncode == ENDS[name], errors
-        if name != "SIGKILL":
+        if name == "SIGINT":
             assert f"--out {name} --resume goes on from there" in errors.decode()
             assert json.loads(Path(name, "results.json").read_text())["complete"] is False
-    whole = run(*begin, "2", "--jobs", "1", "--out", "whole")
-    assert whole.exit_code == ExitCode.OK, whole.output
-    for name in ENDS:
         with Path(name, "rows.jsonl").open("ab") as lines:
             lines.write(b'{"cut')  # as a kill in the middle of a line leaves it
         again = run(*begin, "2", "--jobs", "1", "--out", name, "--resume")
         assert again.exit_code == ExitCode.OK, again.output
-        found, expected = (json.loads(Path(one, "results.json").read_text()) for one in (name, "whole"))
+        found = json.loads(Path(name, "results.json").read_text())
         assert found["games_resumed"] >= 2
         assert (found["complete"], found["games_played"]) == (True, 4)
         assert without_times(found) == without_times(expected)

@@ -6,16 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import run
 from mutants import as_json, other_arrays, torn
 from steerclear.env.record import save
 from steerclear.env.trace import load_trace
-from steerclear.experiments import cli
 from steerclear.experiments.console import ExitCode
 from steerclear.experiments.provenance import head_of
 from steerclear.experiments.reach.pages import played_content, sets_content
 from steerclear.experiments.reach.sets import PlayedSet, SetPair
 from test_report import results as _report_results
-from typer.testing import CliRunner
 
 DATA = Path(__file__).parents[1] / "data"
 LONGEST_S = 5.0
@@ -94,7 +93,7 @@ def check(kind, number, seeds):
     random = np.random.default_rng([number, list(COMMANDS).index(kind)])
     arguments = write(kind, seeds, random)
     before, started = high_water_mib(), time.process_time()
-    done = CliRunner().invoke(cli.app, arguments)
+    done = run(*arguments)
     spent, grown = time.process_time() - started, high_water_mib() - before
     said = f"{kind} {number}: {done.output[-400:]}"
     assert done.exit_code in (ExitCode.OK, ExitCode.GOAL_MISSED, ExitCode.BAD_INPUT), (said, done.exception)
@@ -115,7 +114,7 @@ def test_files_as_they_were_written_are_read(kind, seeds):
         else:
             np.savez("mutant.npz", **seed)
         for arguments in COMMANDS[kind]:
-            done = CliRunner().invoke(cli.app, arguments)
+            done = run(*arguments)
             assert done.exit_code == ExitCode.OK, done.output
 
 
@@ -139,6 +138,6 @@ def test_a_record_that_unpacks_to_more_than_there_is_room_for_is_refused(tmp_pat
     monkeypatch.chdir(tmp_path)
     np.savez_compressed("bomb.npz", **bomb)
     assert Path("bomb.npz").stat().st_size < 2**20
-    done = CliRunner().invoke(cli.app, ["render", "bomb.npz", "--to", "a.html"])
+    done = run("render", "bomb.npz", "--to", "a.html")
     assert done.exit_code == ExitCode.BAD_INPUT
     assert "unpacks to" in done.stderr

@@ -5,13 +5,13 @@ import shlex
 from pathlib import Path
 
 import pytest
+from commands import run
 from steerclear.env.record import save
 from steerclear.experiments import cli
 from steerclear.experiments import cli_train as train
 from steerclear.experiments.console import ExitCode
 from steerclear.policies.entrants import learned
 from steerclear.shield.extras import install_command
-from typer.testing import CliRunner
 
 MISTAKES = [
     tuple(line.split(" -> "))
@@ -39,7 +39,7 @@ def workplace(tmp_path, monkeypatch, game_record):
 @pytest.mark.parametrize(("line", "words"), MISTAKES, ids=[line for line, _ in MISTAKES])
 def test_a_mistake_ends_in_one_line_that_names_the_remedy(line, words, workplace):
     before = sorted(workplace.rglob("*"))
-    done = CliRunner().invoke(cli.app, shlex.split(line))
+    done = run(*shlex.split(line))
     said = " ".join(done.output.split())
     assert done.exit_code == ExitCode.BAD_INPUT, said
     assert isinstance(done.exception, SystemExit)
@@ -55,7 +55,7 @@ def test_a_mistake_ends_in_one_line_that_names_the_remedy(line, words, workplace
 def test_who_learns_without_the_extra_is_told_which_it_is(line, workplace, monkeypatch):
     Path("learn.yaml").write_text((learned.TEAMS / "jin.yaml").read_text(encoding="utf-8"))
     monkeypatch.setattr(train, "find_spec", lambda name: None)
-    done = CliRunner().invoke(cli.app, shlex.split(line))
+    done = run(*shlex.split(line))
     assert done.exit_code == ExitCode.BAD_INPUT, done.output
     assert install_command("train") in done.stderr
     assert not Path("t").exists()

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from steerclear.experiments.rankings import CAPTURES, Totals, keeps, kept_words, prices, score_of, seats, standings
+from steerclear.experiments.rankings import Totals, keeps, kept_words, prices, score_of, seats, standings
 
 PLAIN = {"captures": 0, "grabs": 0, "tags": 0, "collisions": 0, "hits_teammate": 0, "hits_opponent": 0}
 
@@ -31,13 +31,6 @@ def test_a_double_round_robin_adds_up():
     assert table["b"]["score"] == 1 + 1 - 2 - 0.25 * 4
     assert table["a"]["rank_free"] == table["b"]["rank_free"] == 1  # equal scores share the best rank
     assert table["a"]["rank_low"] is None  # one repetition gives no interval
-
-
-def test_repetitions_count_once_and_only_those_all_pairs_have():
-    rows = [game(b, r, k, blue_captures=k) for b, r in (("a", "b"), ("b", "a")) for k in range(3)]
-    totals = Totals.of(seats([*rows, game("a", "b", 3, blue_captures=100)]), ["a", "b"])
-    assert totals.repetitions == 3
-    np.testing.assert_allclose(totals.sums()[:, CAPTURES], [1.0, 1.0])
 
 
 def test_intervals_hold_within_a_stratum_only():
@@ -78,11 +71,6 @@ def test_prices_pair_games_of_the_same_seed():
 def test_a_team_keeps_its_net_captures(off, on, kept):
     assert keeps(np.array([[off, on]])) is kept
     assert score_of(np.zeros(9), 0.25) == 0.0
-
-
-def test_where_nobody_captures_nothing_is_kept():
-    line = price([game("a", "b", 0, state) for state in ("off", "all")])
-    assert (line["kept"], kept_words(line)) == (None, "-")
 
 
 def test_a_loss_that_may_be_chance_is_called_unsure():

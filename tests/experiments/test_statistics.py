@@ -36,12 +36,6 @@ def test_wilson_interval_stays_inside_zero_and_one_and_is_total_ignorance_withou
     assert (nothing.low, nothing.high) == (0.0, 1.0)
 
 
-@pytest.mark.parametrize(("events", "low", "high"), [(1, 0.0253, 5.572), (5, 1.623, 11.668), (10, 4.795, 18.390)])
-def test_garwood_limits_match_the_published_table(events, low, high):
-    interval = count_interval(events)
-    assert (interval.low, interval.high) == pytest.approx((low, high), abs=1e-3)
-
-
 @given(st.integers(1, 400), st.floats(0.1, 100.0))
 def test_garwood_limits_are_the_tails_of_the_poisson_distribution(events, exposure):
     interval = count_interval(events, exposure)
@@ -56,21 +50,7 @@ def test_bootstrap_of_a_mean_agrees_with_scipy():
     spread = theirs.high - theirs.low
     assert ours.value == pytest.approx(values.mean())
     assert (ours.low, ours.high) == pytest.approx((theirs.low, theirs.high), abs=0.04 * spread)
-
-
-def test_bootstrap_is_seeded_and_leaves_out_nan():
-    values = [1.0, float("nan"), 3.0, 8.0]
-    assert mean_interval(values, seed=4) == mean_interval(values, seed=4)
-    assert mean_interval(values, seed=4) == mean_interval([1.0, 3.0, 8.0], seed=4)
-    assert mean_interval(values).value == pytest.approx(4.0)
-
-
-def test_pairing_removes_what_the_seeds_share():
-    random = np.random.default_rng(0)
-    off = random.normal(0.0, 100.0, 30)
-    interval = paired_difference(off, off + 1.0 + random.normal(0.0, 0.01, 30))
-    assert (interval.low, interval.value, interval.high) == pytest.approx((1.0, 1.0, 1.0), abs=0.01)
-    assert interval.low < interval.high
+    assert mean_interval([1.0, math.nan, 8.0], seed=4) == mean_interval([1.0, 8.0], seed=4), "seeded, and without NaN"
 
 
 def test_ratio_of_totals_and_its_missing_denominator():
@@ -130,7 +110,6 @@ def test_means_of_games_that_are_all_alike_have_no_limits_and_differences_of_cou
     ("call", "words"),
     [
         (lambda: share_interval(3, 2), "successes <= trials"),
-        (lambda: share_interval(-1, 2), "successes <= trials"),
         (lambda: count_interval(-1), "events >= 0"),
         (lambda: count_interval(1, 0.0), "exposure > 0"),
         (lambda: count_ratio_interval(1, -1), "counts >= 0"),

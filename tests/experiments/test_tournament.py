@@ -4,7 +4,6 @@ import json
 import textwrap
 
 from json_keys import KEYS, undocumented
-from steerclear.experiments import tournament
 from steerclear.experiments.runner import execute, job_id
 from steerclear.experiments.tournament import (
     TournamentSettings,
@@ -13,7 +12,6 @@ from steerclear.experiments.tournament import (
     names_of,
     play_game,
     results_of,
-    subtitle,
     write_html,
     write_markdown,
 )
@@ -67,34 +65,13 @@ def without_times(rows):
 def test_every_pair_meets_on_both_sides_from_the_same_seeds():
     jobs = settings(states=("off", "meo"), repetitions=2, seed=7).experiment().jobs
     assert len(jobs) == len({job_id(job) for job in jobs}) == 3 * 2 * 2 * 2
+    assert label("entries/our_team.zip") == label("x/our_team/solution.py") == "our_team"
     assert {(job["game"], job["seed"]) for job in jobs} == {(0, 7), (1, 8)}
     met = {(job["own"], job["opponent"]) for job in jobs}
     assert met == {(b, r) for b, r in met} | {(r, b) for b, r in met}
     covered = [(job["own"], job["opponent"]) for job in jobs if job["shield"] is not None]
     assert {own for own, _ in covered} == {"meo"}
     assert all(job["shield"] is None and job["opponent_shield"] is None for job in jobs if job["state"] == "off")
-
-
-def test_an_interrupted_tournament_ends_with_the_same_table(tmp_path, monkeypatch):
-    whole = play(settings(), tmp_path / "whole")
-    assert len(whole.rows) == 6
-    count = iter(range(100))
-
-    def killed_at_the_third(job):
-        if next(count) == 2:
-            raise KeyboardInterrupt
-        return play_game(job)
-
-    monkeypatch.setattr(tournament, "play_game", killed_at_the_third)
-    cut = play(settings(), tmp_path / "cut")
-    monkeypatch.undo()
-    assert cut.interrupted
-    words = subtitle(results_of(cut, settings()))
-    assert words.endswith("not complete: no shields 2 games, repetitions of every pair that met: 1")
-    again = play(settings(), tmp_path / "cut", resume=True)
-    assert again.resumed == 2
-    assert without_times(again.rows) == without_times(whole.rows)
-    assert str(results_of(again, settings())["states"]) == str(results_of(whole, settings())["states"])
 
 
 def test_results_rows_report_and_page_hold_what_they_say(tmp_path):
@@ -138,8 +115,3 @@ def test_a_team_that_ends_itself_is_named_and_stops_nothing(tmp_path):
     assert content["complete"]
     assert content["silent"] == ["quitter"]
     assert any("quitter failed" in words and "exit status 3" in words for words in content["warnings"])
-
-
-def test_labels_are_short_names(tmp_path):
-    assert label("ohto") == "ohto"
-    assert label("entries/our_team.zip") == label("x/our_team/solution.py") == "our_team"

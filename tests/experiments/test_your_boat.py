@@ -5,10 +5,9 @@ import re
 import pytest
 import yaml
 from boat_page import PAGE, commands, follow, lines
-from steerclear.experiments.cli import app
+from commands import run
 from steerclear.experiments.deploy.player import NEED_NO_GAME
 from steerclear.shield.platforms.files import load_platform
-from typer.testing import CliRunner
 
 
 def test_the_page_shows_each_step_and_all_of_them_exist():
@@ -16,7 +15,7 @@ def test_the_page_shows_each_step_and_all_of_them_exist():
     assert named == ["platform"] * 3 + ["sea-trial", "fit", "platform", "preflight", "deploy", "replay"]
     for words in commands() + commands("sim"):
         command = words[1 : 3 if words[1] == "platform" else 2]
-        result = CliRunner().invoke(app, [*command, "--help-all"])
+        result = run(*command, "--help-all")
         assert result.exit_code == 0, words
         options = [word for word in words if word.startswith("--")]
         assert all(option in result.output for option in options), words
@@ -25,7 +24,7 @@ def test_the_page_shows_each_step_and_all_of_them_exist():
 def test_the_first_description_is_one_that_the_shield_takes(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for words in commands()[:3]:
-        result = CliRunner().invoke(app, words[1:])
+        result = run(*words[1:])
         assert result.exit_code == 0, (words, result.output)
     assert load_platform("my_boat.yaml").platform.name == "my_boat"
     assert "turns 90 deg" in result.output

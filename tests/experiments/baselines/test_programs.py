@@ -1,4 +1,6 @@
-"""The compiled projection and the relaxed program of unicycles against QP solvers; a boat as a unicycle."""
+"""What filters of the literature are made of: barriers, the compiled projection, the relaxed program, the unicycle."""
+
+import math
 
 import numpy as np
 import pytest
@@ -6,6 +8,7 @@ import qpsolvers
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from steerclear.experiments.baselines.active_set import INFEASIBLE, OPTIMAL, STALLED, project
+from steerclear.experiments.baselines.barriers import collision_cone, exponential_cbf, parabolic, velocity_cbf
 from steerclear.experiments.baselines.unicycle import (
     RELAXED,
     SLACK_WEIGHT,
@@ -20,7 +23,51 @@ from steerclear.shield.platforms import get_platform, step_boat
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.limits import cruise
 
-many = settings(max_examples=200, deadline=None, derandomize=True)
+RADIUS_M = 2.5
+A1_PER_S, K_LAMBDA_PER_M, K_MU_PER_S = 0.7, 0.2, 0.15
+UNIT = math.sqrt(1.05**2 - 1.0) / RADIUS_M
+GAINS = {
+    velocity_cbf: (),
+    exponential_cbf: (A1_PER_S,),
+    collision_cone: (),
+    parabolic: (K_LAMBDA_PER_M / UNIT, K_MU_PER_S / UNIT),
+}
+ALL = pytest.mark.parametrize("barrier", list(GAINS), ids=lambda barrier: barrier.__name__)
+metres = st.floats(-30.0, 30.0)
+speeds = st.floats(-5.0, 5.0)
+
+
+def jet(barrier, point):
+    h, h_p, h_v = barrier(np.array(point[:2]), np.array(point[2:]), RADIUS_M, *GAINS[barrier])
+    return np.array([h, *h_p, *h_v])
+
+
+@ALL
+@settings(max_examples=150, deadline=None)
+@given(px=metres, py=metres, vx=speeds, vy=speeds)
+def test_gradients_are_those_of_h(barrier, px, py, vx, vy):
+    assume(abs(math.hypot(px, py) - RADIUS_M) > 0.1)
+    assume(math.hypot(px, py) > 0.3 and math.hypot(vx, vy) > 0.1)
+    point, step = np.array([px, py, vx, vy]), 1e-6
+    differences = [
+        (jet(barrier, point + step * axis)[0] - jet(barrier, point - step * axis)[0]) / (2 * step) for axis in np.eye(4)
+    ]
+    if barrier is velocity_cbf:  # there the inputs act on p itself
+        differences[2:] = differences[:2]
+    np.testing.assert_allclose(jet(barrier, point)[1:], differences, rtol=2e-5, atol=2e-5)
+
+
+@pytest.mark.parametrize(("miss_m", "safe"), [(2.4, False), (2.6, True)])
+def test_collision_cone_tells_a_miss_from_a_hit(miss_m, safe):
+    """A straight course that passes at a distance below the radius is unsafe however far off, one above is safe."""
+    for away in (5.0, 50.0):
+        assert (jet(collision_cone, (away, miss_m, -2.0, 0.0))[0] > 0.0) == safe
+
+
+@ALL
+@pytest.mark.parametrize("point", [(0.0, 0.0, 1.0, 0.0), (1.0, 0.0, 0.0, 0.0), (RADIUS_M, 0.0, 0.0, 0.0)])
+def test_singular_places_give_numbers(barrier, point):
+    assert np.isfinite(jet(barrier, point)).all()
 
 
 def run(C, d, z0):
@@ -61,7 +108,7 @@ def test_the_projection_agrees_with_other_solvers(solver, program):
     assert z == pytest.approx(other, rel=0, abs=2e-6)
 
 
-@many
+@settings(max_examples=200, deadline=None, derandomize=True)
 @given(programs(feasible=False))
 def test_infeasible_programs_are_told(program):
     """Whatever is claimed is checked by linear programming, which knows nothing of projections."""

@@ -57,7 +57,10 @@ def test_an_attack_from_end_to_end_and_its_replay():
     assert keys.undocumented(content, keys.KEYS["attack"]) == []
     assert content["found"] == 2
     scene = Path("out") / content["searches"][0]["scene"]
-    assert run("encounters", "--guard", "none", "--scene", scene).exit_code == ExitCode.OK
+    again = run("encounters", "--guard", "none", "--scene", scene, "--out", "again")
+    assert again.exit_code == ExitCode.OK
+    assert again.stdout.splitlines()[3].split()[1] == "none"
+    assert Path("again/replay.html").stat().st_size > 0
     resumed = run(*arguments, "--resume", "--json", "again.json")
     assert resumed.exit_code == ExitCode.OK
     assert json.loads(Path("again.json").read_text())["searches"] == content["searches"]

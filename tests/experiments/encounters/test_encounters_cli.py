@@ -12,7 +12,6 @@ from steerclear.experiments.encounters import Conditions, draw, play, results
 from steerclear.experiments.encounters.replay import record_of
 from steerclear.experiments.encounters.report import cells_table
 from steerclear.experiments.encounters.results import Cell, goals_of
-from steerclear.experiments.encounters.scene import write_scene
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
 
@@ -31,33 +30,11 @@ def test_a_small_run_from_end_to_end_and_again():
     assert "head_on" in Path("out/report.html").read_text()
     assert Path("out/replay.html").stat().st_size > 0
     assert max(len(line) for line in done.stdout.splitlines()) <= 80
-    again = run(*SMALL, "--guard", "none", "--out", "out")
-    assert again.exit_code == ExitCode.BAD_INPUT
-    assert "add --resume" in again.output
     resumed = run(*SMALL, "--guard", "none", "--out", "out", "--resume", "--json", "copy.json")
     assert resumed.exit_code == ExitCode.OK
     second = json.loads(Path("copy.json").read_text())
     assert second["encounters_resumed"] == 6
     assert second["cells"] == content["cells"]
-
-
-def test_an_interrupted_run_keeps_what_is_done(monkeypatch):
-    whole, played = results.play_job, []
-
-    def stop_at_the_second(job):
-        if played:
-            raise KeyboardInterrupt
-        played.append(job)
-        return whole(job)
-
-    monkeypatch.setattr(results, "play_job", stop_at_the_second)
-    done = run(*SMALL, "--guard", "none", "--no-judge", "--out", "out")
-    assert done.exit_code == ExitCode.INTERRUPTED
-    assert "1 of 2 chunks of encounters kept" in done.output
-    content = json.loads(Path("out/results.json").read_text())
-    assert not content["complete"]
-    monkeypatch.setattr(results, "play_job", whole)
-    assert run(*SMALL, "--guard", "none", "--no-judge", "--out", "out", "--resume").exit_code == ExitCode.OK
 
 
 def test_the_same_scenes_for_every_guard_and_exit_status_one_for_avoidable_breaches(monkeypatch):
@@ -76,14 +53,6 @@ def _breaching(measure_chunk):
         return columns
 
     return measured
-
-
-def test_a_scene_file_is_played_again():
-    write_scene(Path("scene.json"), draw("head_on", "heron", "heron", USUAL, 0, 0, 1), USUAL)
-    done = run("encounters", "--scene", "scene.json", "--guard", "none", "--out", "out")
-    assert done.exit_code == ExitCode.OK, done.output
-    assert done.stdout.splitlines()[3].split()[:2] == ["scene.json", "none"]
-    assert Path("out/replay.html").stat().st_size > 0
 
 
 @pytest.mark.parametrize("family", ["rammer_2", "corner"])

@@ -98,7 +98,7 @@ def entry_actions(package, folder, recorded):
     import solution
 
     entry, actions = solution.solution(), []
-    for row in recorded["state"]:
+    for row in recorded["state"][:10]:
         state = state_of(row)
         seen = dict.fromkeys([f"agent_{i}" for i in range(3)], row)
         actions.append([entry.compute_action(f"agent_{i}", seen, seen, state) for i in range(3)])

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from steerclear import policies
 from steerclear.experiments.entries import sandbox
 from steerclear.experiments.entries import team as entry_team
-from steerclear.experiments.entries.child import Unreadable, from_plain, to_plain
+from steerclear.experiments.entries.child import from_plain
 from steerclear.experiments.entries.team import EntryTeam, is_entry, make_team
 from steerclear.experiments.play import match
 from steerclear.experiments.play.match import play_match
@@ -46,27 +46,6 @@ def test_games_are_the_same_to_the_bit(write_entry, monkeypatch):
     assert here.row["policy_failures"] > 0, "the two name failures alike as well"
 
 
-@pytest.mark.parametrize(
-    "action",
-    [
-        None, 3, -1, True, 2.5, float("inf"), "PC", (1.5, 20.0), [1.5, 20], (np.float32(0.1), np.int64(4)), np.int64(7),
-        np.array(4), np.array([1.5, 0.1], dtype=np.float32), np.zeros((2, 2)), np.array([True]), (), np.array([]),
-    ],
-)  # fmt: skip
-def test_actions_travel_unchanged(action):
-    again = from_plain(to_plain(action))
-    assert type(again) is type(action)
-    np.testing.assert_array_equal(again, action)
-    assert getattr(again, "dtype", None) == getattr(action, "dtype", None)
-
-
-@pytest.mark.parametrize("action", [object(), b"x", 1j, np.array([1j]), "x" * 100, [0] * 100, 10**30, {"a": 1}, {4}])
-def test_what_is_no_action_still_looks_like_itself(action):
-    again = from_plain(to_plain(action))
-    assert isinstance(again, Unreadable)
-    assert repr(again)[:5] == repr(action)[:5]
-
-
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=9),
     lambda inner: (
@@ -83,15 +62,6 @@ def test_whatever_an_entry_says_is_read_without_an_error(content):
     found = from_plain(content)
     if content is None or isinstance(content, (bool, int, str)):
         assert found == content
-
-
-def test_infos_that_lack_what_an_entry_is_entitled_to_are_told(team_of, game):
-    env, observations, infos = game
-    team = team_of("return 4")
-    team.reset(env, ["agent_0", "agent_1", "agent_2"], 0)
-    with pytest.raises(PolicyError, match="infos lack"):
-        team.act(observations, {})
-    assert team.act(observations, infos)["agent_0"] == 4
 
 
 def test_only_foreign_code_is_put_apart(write_entry):

@@ -1,17 +1,69 @@
-"""Brute force over all bang sequences finds nothing that the oracle misses, and every plan holds when replayed."""
+"""Brute force over all bang sequences finds nothing that the analysis misses, and every plan holds when replayed."""
+
+import math
 
 import numpy as np
 import pytest
-from brute import any_sequence
 from oracle_runs import DT_S, random_run
 from steerclear.env.record import find_breaches
 from steerclear.experiments.oracle import Outcome, Settings, judge
 from steerclear.experiments.oracle.verdict import FULL
+from steerclear.shield.jit import kernel
+from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms import step_boat
+from steerclear.shield.platforms.actuator import command_for_turn, largest_turn, thrust_after
 
 RADIUS_M = 2.5
 FINER = FULL._replace(width=4 * FULL.width, cells=tuple(size / 2 for size in FULL.cells))
 SHORT = Settings(settle_s=0.5, longest_s=0.8, look_back_s=4.0)
+
+
+@kernel
+def _hold(params, state, choice, rudder, steps, others, k, radius_m, dt_s):
+    for i in range(k + 1, k + steps + 1):
+        speed_mps = state[L.SPEED]
+        if choice == 0:
+            speed_mps = 0.0
+        elif choice == 2:
+            speed_mps = params[L.MAX_SPEED]
+        trial = state.copy()
+        trial[L.THRUST] = thrust_after(params, state, speed_mps, dt_s)
+        turn_deg = rudder * largest_turn(params, trial, dt_s)
+        step_boat(params, state, speed_mps, command_for_turn(params, state, speed_mps, turn_deg, dt_s), dt_s)
+        for m in range(others.shape[1]):
+            if math.hypot(others[i, m, 0] - state[L.X], others[i, m, 1] - state[L.Y]) <= radius_m:
+                return False
+    return True
+
+
+@kernel
+def any_sequence(params, start, others, rudders, macro, radius_m, dt_s):
+    """Whether some sequence of (speed choice, rudder), each held for ``macro`` steps, stays clear to the end."""
+    steps = others.shape[0] - 1
+    depth = (steps + macro - 1) // macro
+    choices = 3 * rudders.size
+    stack = np.empty((depth + 1, start.size))
+    stack[0] = start
+    taken = np.zeros(depth, dtype=np.int64)
+    level = 0
+    while level >= 0:
+        if level == depth:
+            return True
+        if taken[level] == choices:
+            taken[level] = 0
+            level -= 1
+            continue
+        action = taken[level]
+        taken[level] += 1
+        state = stack[level].copy()
+        k = level * macro
+        length = min(macro, steps - k)
+        if _hold(
+            params, state, action // rudders.size, rudders[action % rudders.size], length, others, k, radius_m, dt_s
+        ):
+            level += 1
+            stack[level] = state
+    return False
 
 
 def replayed(states, rows, verdict):
@@ -83,11 +135,11 @@ def test_large_brute_force_finds_nothing_more(name, size_m, macro, back):
     assert sum(found) > 10
 
 
-@pytest.mark.parametrize("name", ["heron", "surveyor", "mctf2024_sim", "large_usv", "si", "di"])
+@pytest.mark.parametrize("name", ["heron", "mctf2024_sim", "large_usv", "di"])
 def test_plans_hold_when_replayed_with_the_packages_boat(name):
-    size_m = {"large_usv": 100.0, "si": 60.0, "di": 60.0}.get(name, 35.0)
+    size_m = {"large_usv": 100.0, "di": 60.0}.get(name, 35.0)
     states, rows = random_run(name, 5, size_m, 900, seed=11, chasers=2)
-    breaches = [row for row in find_breaches(states[:, :, :2], RADIUS_M) if row[0] > 1][:12]
+    breaches = [row for row in find_breaches(states[:, :, :2], RADIUS_M) if row[0] > 1][:8]
     assert len(breaches) >= 3
     checked = 0
     for step, a, b, _ in breaches:
@@ -111,6 +163,7 @@ def _apart(states, verdict):
     return np.hypot(*(others - begin[verdict.own, :2]).T).min() > RADIUS_M
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", ["heron", "surveyor"])
 def test_what_cannot_be_avoided_cannot_be_on_a_finer_search(name):
     # one step after the last preventable moment nothing was found: nothing is found there by a finer search either

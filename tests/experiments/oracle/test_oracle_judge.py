@@ -1,11 +1,30 @@
-"""What a verdict means: where the search may begin and end, third boats, and both sides."""
+"""What a verdict means: where the search may begin and end, third boats, both sides, currents and late commands.
 
+What is judged shares no code with what judges it, and damaged input is one error that names the remedy.
+"""
+
+import ast
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from oracle_runs import DT_S, driven_track, first_breach, straight_track
-from steerclear.experiments.oracle import Outcome, Responsible, judge, judge_breach
+from steerclear.experiments import oracle
+from steerclear.experiments.oracle import (
+    Boat,
+    Motion,
+    OracleError,
+    Outcome,
+    Responsible,
+    Settings,
+    judge,
+    judge_breach,
+)
+from steerclear.experiments.oracle.boat_model import rows_of
+from steerclear.experiments.oracle.verdict import Level
 from steerclear.shield.platforms import fresh_state, get_platform
 
 RADIUS_M = 2.5
@@ -47,7 +66,7 @@ def test_avoidable_from_every_earlier_step():
 
 def test_a_third_boat_in_the_way_counts():
     # walls of stopped boats left and right leave only the brake
-    wall = [straight_track((side * 2.6, 2.6 * k - 3.0), (0, 0), 200) for side in (-1, 1) for k in range(12)]
+    wall = [straight_track((side * 2.6, 2.6 * k + 10.0), (0, 0), 200) for side in (-1, 1) for k in range(7)]
     ahead = straight_track((0.0, 25.0), (0.0, 0.0), 200)
     alone, rows = heron_towards([ahead])
     walled, many = heron_towards([ahead, *wall])
@@ -75,66 +94,200 @@ def test_started_inside():
     assert both.responsible_boats() == ()
 
 
-class TestSides:
-    """Who is responsible."""
+@pytest.mark.parametrize(
+    ("first", "second", "expected"),
+    [
+        (20, 20, Responsible.BOTH),
+        (20, 21, Responsible.BOTH),
+        (20, 22, Responsible.SECOND),
+        (22, 20, Responsible.FIRST),
+        (None, 0, Responsible.SECOND),
+        (0, None, Responsible.FIRST),
+        (None, None, Responsible.NEITHER),
+    ],
+)
+def test_who_had_the_later_last_chance_is_responsible_with_a_step_to_spare(first, second, expected):
+    states, rows = heron_towards([straight_track((0.5, 25.0), (0.0, 0.0), 200)])
+    one = judge(states, rows, 0, first_breach(states, RADIUS_M), RADIUS_M)
+    one, other = replace(one, last_step=first), replace(one, own=1, other=0, last_step=second)
+    assert Responsible.of(one, other, np.zeros((200, 2), dtype=bool)) is expected
 
-    @pytest.mark.parametrize(
-        ("first", "second", "expected"),
-        [
-            (20, 20, Responsible.BOTH),
-            (20, 21, Responsible.BOTH),
-            (20, 22, Responsible.SECOND),
-            (21, 20, Responsible.BOTH),
-            (22, 20, Responsible.FIRST),
-            (None, 0, Responsible.SECOND),
-            (0, None, Responsible.FIRST),
-            (None, None, Responsible.NEITHER),
-        ],
-    )
-    def test_the_later_last_chance_with_a_step_to_spare(self, first, second, expected):
-        states, rows = heron_towards([straight_track((0.5, 25.0), (0.0, 0.0), 200)])
-        step = first_breach(states, RADIUS_M)
-        one = judge(states, rows, 0, step, RADIUS_M)
-        one, other = replace(one, last_step=first), replace(one, own=1, other=0, last_step=second)
-        assert Responsible.of(one, other, np.zeros((200, 2), dtype=bool)) is expected
 
-    def test_the_one_with_the_last_chance(self):
-        # the other cannot turn or brake: a point on a rail, so its last chance is none
-        states, rows = heron_towards([straight_track((0.0, 40.0), (0.0, -2.0), 150)], steps=150)
-        step = first_breach(states, RADIUS_M)
-        rail = get_platform("di").pack()
-        rail[[1, 7, 19]] = 2.0, 0.0, 0.0
-        states[:, 1, 2:4] = 180.0, 2.0
-        both = judge_breach(states, np.array([rows[0], rail]), (0, 1), step, RADIUS_M)
-        assert both.second.outcome is Outcome.UNAVOIDABLE
-        assert both.responsible is Responsible.FIRST
-        assert both.responsible_boats() == (0,)
-        assert both.of(1) is both.second
-        mirrored = judge_breach(states, np.array([rows[0], rail]), (1, 0), step, RADIUS_M)
-        assert mirrored.responsible is Responsible.SECOND
-        assert mirrored.responsible_boats() == (0,)
+def test_who_cannot_turn_or_brake_has_no_chance():
+    """A point on a rail."""
+    states, rows = heron_towards([straight_track((0.0, 40.0), (0.0, -2.0), 150)], steps=150)
+    step = first_breach(states, RADIUS_M)
+    rail = get_platform("di").pack()
+    rail[[1, 7, 19]] = 2.0, 0.0, 0.0
+    states[:, 1, 2:4] = 180.0, 2.0
+    for pair, responsible in (((0, 1), Responsible.FIRST), ((1, 0), Responsible.SECOND)):
+        both = judge_breach(states, np.array([rows[0], rail]), pair, step, RADIUS_M)
+        assert both.of(1).outcome is Outcome.UNAVOIDABLE
+        assert (both.responsible, both.responsible_boats()) == (responsible, (0,))
 
-    def test_both_of_a_symmetric_meeting_unless_driven(self):
-        steps = 150
-        first = fresh_state(0.0, 0.0, 0.0, 2.0)
-        second = fresh_state(0.0, 40.0, 180.0, 2.0)
-        first[4] = second[4] = 100.0
-        tracks = [driven_track(HERON.pack(), state, [(2.0, 0.0)] * steps) for state in (first, second)]
-        states, rows = np.stack(tracks, axis=1), np.array([HERON.pack()] * 2)
-        step = first_breach(states, RADIUS_M)
-        assert judge_breach(states, rows, (0, 1), step, RADIUS_M).responsible is Responsible.BOTH
-        driven = np.zeros((steps, 2), dtype=bool)
-        driven[:, 1] = True
-        assert judge_breach(states, rows, (0, 1), step, RADIUS_M, driven=driven).responsible is Responsible.FIRST
-        driven[:, 0] = True
+
+def head_on(gap_m, steps):
+    """Two herons at full speed towards each other."""
+    south, north = fresh_state(0.0, 0.0, 0.0, 2.0), fresh_state(0.0, gap_m, 180.0, 2.0)
+    south[4] = north[4] = 100.0
+    rows = [driven_track(HERON.pack(), boat, [(2.0, 0.0)] * steps) for boat in (south, north)]
+    return np.stack(rows, axis=1), np.array([HERON.pack()] * 2)
+
+
+def test_both_of_a_symmetric_meeting_unless_driven():
+    states, rows = head_on(40.0, 150)
+    step, driven = first_breach(states, RADIUS_M), np.zeros((150, 2), dtype=bool)
+    for boats, responsible in (([], Responsible.BOTH), ([1], Responsible.FIRST), ([0, 1], Responsible.GAME)):
+        driven[:, boats] = True
         both = judge_breach(states, rows, (0, 1), step, RADIUS_M, driven=driven)
-        assert (both.responsible, both.responsible_boats()) == (Responsible.GAME, ())
+        assert both.responsible is responsible
+    assert both.responsible_boats() == ()
 
-    def test_neither(self):
-        rail = get_platform("di").pack()
-        rail[[1, 7, 19]] = 2.0, 0.0, 0.0
-        tracks = [straight_track((0, 0), (0, 2.0), 90), straight_track((0, 12.0), (0, -2.0), 90)]
-        states = np.stack(tracks, axis=1)
-        states[:, :, 3], states[:, 1, 2] = 2.0, 180.0
-        both = judge_breach(states, np.array([rail, rail]), (0, 1), first_breach(states, RADIUS_M), RADIUS_M)
-        assert both.responsible is Responsible.NEITHER
+
+CURRENT = (0.5, 0.0)
+
+
+def slow_boat_upstream(steps=120):
+    """A boat of 0.2 m/s makes for a drifting one 4 m west of it; the water goes east at 0.5 m/s."""
+    rows = np.zeros((steps + 1, 2, 11))
+    ran_s = DT_S * np.arange(steps + 1)
+    rows[:, 0, 0] = 4.0 + (CURRENT[0] - 0.2) * ran_s
+    rows[:, 0, 2], rows[:, 0, 3] = -90.0, 0.2
+    rows[:, 1, 0] = CURRENT[0] * ran_s
+    boat = Boat("single_integrator", 0.2, max_turn_dps=90.0)
+    return rows, [boat, boat]
+
+
+def test_a_boat_that_could_have_stayed_where_the_water_took_it():
+    states, boats = slow_boat_upstream()
+    step = first_breach(states, RADIUS_M)
+    told = judge(states, boats, 0, step, RADIUS_M, motion=Motion(CURRENT))
+    assert told.outcome is Outcome.AVOIDABLE
+    forgotten = judge(states, boats, 0, step, RADIUS_M)
+    assert forgotten.outcome is Outcome.UNAVOIDABLE  # it cannot outrun a boat that seems to come at 0.5 m/s
+
+
+def test_no_command_arrived_in_time():
+    states, rows = head_on(12.0, 80)
+    step = first_breach(states, RADIUS_M)
+    told = judge(states, rows, 0, step, RADIUS_M, motion=Motion(delay_steps=(20, 0)))
+    assert (told.outcome, told.last_preventable_s, told.exhausted) == (Outcome.UNAVOIDABLE, None, True)
+    forgotten = judge(states, rows, 0, step, RADIUS_M)
+    assert forgotten.outcome is Outcome.AVOIDABLE
+    assert step - forgotten.last_step < 20 < step  # commands of the first moments come too late
+
+
+def test_who_had_the_last_chance_is_a_matter_of_when_commands_were_given():
+    states, rows = head_on(30.0, 120)
+    step = first_breach(states, RADIUS_M)
+    at_once = judge_breach(states, rows, (0, 1), step, RADIUS_M)
+    late = judge_breach(states, rows, (0, 1), step, RADIUS_M, motion=Motion(delay_steps=(5, 0)))
+    assert (at_once.responsible, late.responsible) == (Responsible.BOTH, Responsible.SECOND)
+    assert late.first.last_step == at_once.first.last_step - 5
+    assert late.first.plan.begin_step == at_once.first.plan.begin_step
+    assert late.second.last_step == at_once.second.last_step
+
+
+FILES = sorted(Path(oracle.__file__).parent.glob("*.py"))
+ALLOWED = {"__future__", "contextlib", "numpy", "numba", "math", "dataclasses", "enum", "typing", "collections",
+           "functools", "hashlib", "itertools", "logging", "pathlib"}  # fmt: skip
+BLOCKED = """
+import sys
+class Wall:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[:2] in (["steerclear", "shield"], ["steerclear", "env"], ["steerclear", "policies"]):
+            raise ImportError("blocked: " + name)
+sys.meta_path.insert(0, Wall())
+import numpy as np
+from steerclear.experiments.oracle import Boat, judge
+rows = np.zeros((60, 2, 11))
+rows[:, 0, 1] = np.arange(60) * 0.3
+rows[:, 0, 3] = 3.0
+rows[:, 1, 1] = 10.0
+own = Boat("single_integrator", 10.0, max_turn_dps=90.0)
+print(judge(rows, [own, own], 0, 25, 2.5).outcome, *(n for n in sys.modules if n.startswith("steerclear.shield")))
+"""
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.name)
+def test_imports_nothing_of_ours_from_outside(file):
+    for node in ast.walk(ast.parse(file.read_text())):
+        names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+        if isinstance(node, ast.ImportFrom):
+            assert node.level <= 1, f"line {node.lineno} reaches out of the folder"
+            names = [] if node.level else [node.module or ""]
+        assert {name.split(".")[0] for name in names} <= ALLOWED
+
+
+def test_judges_where_the_shield_cannot_be_imported():
+    done = subprocess.run([sys.executable, "-c", BLOCKED], capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == ["avoidable"]
+
+
+LEVEL = Level(5, (1.0,) * 5, (0.0,), ((0.5,),))
+
+
+@pytest.fixture
+def run():
+    """Two boats on rails that meet; the parameters and the step of their violation."""
+    states = np.stack([straight_track((0, 0), (0, 2.0), 90), straight_track((0, 12.0), (0, 0), 90)], axis=1)
+    return states, np.array([HERON.pack()] * 2), first_breach(states, 2.5)
+
+
+@pytest.mark.parametrize("place", [(3, 0, 0), (90, 1, 2)])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_states_that_are_not_finite_but_for_a_controller_that_has_not_run(run, place, value):
+    states, rows, step = run
+    states[:, :, [6, 8]] = np.nan
+    judge(states, rows, 0, step, 2.5)
+    states[place] = value
+    with pytest.raises(OracleError, match=rf"boat {place[1]} at step {place[0]} is not finite; check the recorder"):
+        judge(states, rows, 0, step, 2.5)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"states": np.zeros((5, 2, 2))}, r"shape \(steps \+ 1, boats, 11\)"),
+        ({"states": [[["x"] * 11] * 2] * 3}, "must be numbers"),
+        ({"radius_m": 0.0}, "radius_m is 0.0; give a positive"),
+        ({"dt_s": -0.1}, "dt_s is -0.1; give a positive"),
+        ({"own": 2}, r"no boat 2; the record's boats are 0..1"),
+        ({"other": 0}, "no breach"),
+        ({"step": 0}, r"no step 0 to judge; the record's steps are 1..90"),
+        ({"step": 10}, "no breach of 2.5 m; give the first step inside"),
+        ({"boats": np.array([HERON.pack()])}, "hold 2 boats but 1 parameter sets"),
+        ({"motion": Motion(delay_steps=(5,))}, "one per boat"),
+    ],
+)
+def test_questions_that_make_no_sense(run, changes, words):
+    states, rows, step = run
+    asked = {"states": states, "boats": rows, "own": 0, "step": step, "radius_m": 2.5, **changes}
+    with pytest.raises(OracleError, match=words):
+        judge(**asked)
+
+
+@pytest.mark.parametrize("driven", [np.zeros((90, 3), bool), np.zeros((90, 2))])
+def test_marks_of_who_drove_that_do_not_fit(run, driven):
+    states, rows, step = run
+    with pytest.raises(OracleError, match="one row per step"):
+        judge_breach(states, rows, (0, 1), step, 2.5, driven=driven)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Settings(look_back_s=0.0), "look_back_s must be a number of seconds, at least 0.1"),
+        (lambda: Settings(quick=LEVEL._replace(width=0)), "search level needs"),
+        (lambda: Motion((np.nan, 0.0)), "two finite speeds"),
+        (lambda: Motion(delay_steps=(0.5, 1)), "whole number"),
+        (lambda: rows_of(np.zeros((2, 37))), "give one row per boat"),
+        (lambda: rows_of(np.full((1, 38), np.nan)), "not finite"),
+        (lambda: Boat("ship", 2.0), "choose one of"),
+        (lambda: Boat("usv", 2.0, thrust_map=((0.0, 0.0), (0.0, 1.0))), "rising thrust"),
+    ],
+)
+def test_settings_and_boats_that_cannot_be(make, words):
+    with pytest.raises(OracleError, match=words):
+        make()

@@ -30,8 +30,7 @@ def meeting(platform, start_m, speed_mps, other, steps=150):
     return np.stack([rows, other], axis=1), np.array([platform.pack()] * 2)
 
 
-@pytest.mark.parametrize("speed_mps", [1.0, 2.0, 3.0, 5.0])
-@pytest.mark.parametrize("max_acc", [0.5, 1.0])
+@pytest.mark.parametrize(("speed_mps", "max_acc"), [(1.0, 0.5), (2.0, 1.0), (5.0, 1.0), (3.0, 0.5)])
 def test_last_stop_before_a_stopped_boat(speed_mps, max_acc):
     # braking v -> 0 with trapezoid steps takes exactly v^2 / 2a when v is a whole number of steps
     platform = straight_boat(10.0, max_acc=max_acc)
@@ -53,7 +52,7 @@ def dubins(speed_mps, turn_dps):
 
 
 @pytest.mark.parametrize(("speed_mps", "turn_dps"), [(2.0, 30.0), (3.0, 20.0), (1.0, 10.0)])
-@pytest.mark.parametrize("offset_m", [0.0, 0.8, 2.0])
+@pytest.mark.parametrize("offset_m", [0.0, 2.0])
 def test_turning_circle_past_a_stopped_boat(speed_mps, turn_dps, offset_m):
     # the turning circle (radius R, centre R to the side) must stay outside the disc: d^2 + (R + b)^2 >= (R + r)^2
     circle_m = speed_mps / math.radians(turn_dps)
@@ -67,7 +66,7 @@ def test_turning_circle_past_a_stopped_boat(speed_mps, turn_dps, offset_m):
     assert needed_m - 0.05 * speed_mps <= left_m <= needed_m + 1.2 * speed_mps * DT_S
 
 
-@pytest.mark.parametrize("mover_mps", [(0.0, -2.0), (0.0, 1.0), (1.5, 0.0), (-1.0, -1.0)])
+@pytest.mark.parametrize("mover_mps", [(0.0, -2.0), (1.5, 0.0)])
 def test_constant_speed_evader_against_a_straight_mover(mover_mps):
     # the extremals of this game turn hard one way and then run straight: the best over all lengths of the turn
     speed_mps, turn_dps = 2.0, 30.0

@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from steerclear.env.mctf import MctfEnv
-from steerclear.env.record import read_meta
 from steerclear.experiments import verdicts
 from steerclear.experiments.play.conditions import CALM, Conditions, Disturbances
-from steerclear.experiments.play.match import Match, play_match
+from steerclear.experiments.play.match import Match
 from steerclear.experiments.play.spec import MatchSpec
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import layout as L
@@ -83,19 +82,6 @@ def test_off_and_on_share_their_draws_and_another_seed_has_others():
     np.testing.assert_array_equal(seen, b.shielding.disturbances.seen)
 
 
-def test_the_same_conditions_are_the_same_game():
-    first, again = (play_match(spec_of(ALL, shield={})).record for _ in range(2))
-    for name, array in first.items():
-        np.testing.assert_array_equal(array, again[name])
-
-
-def test_a_boat_that_drifts_goes_with_the_water():
-    match = Match(spec_of(Conditions(current_mps=0.3), "hold", "hold", rules={"max_time_s": 5.0}))
-    position = match.play().record["position"]
-    way = np.array(match.shielding.motion.current_mps) * 5.0
-    np.testing.assert_allclose(position[-1] - position[0], np.broadcast_to(way, (6, 2)), atol=1e-9)
-
-
 def test_a_boat_carried_over_the_edge_is_out_of_bounds_and_comes_back():
     env = MctfEnv("aamas2024")
     sea = Disturbances(env, Conditions(current_mps=0.4), 0, 0)
@@ -148,14 +134,6 @@ def test_the_oracle_is_told_of_the_same_physics(monkeypatch):
     assert told == [match.shielding.motion]
     assert told[0].delay_steps == (3, 3, 3, 0, 0, 0)
     assert row["breaches"]
-
-
-def test_team_mates_hit_each_other_without_the_shield_only():
-    rules = {"max_time_s": 60.0}
-    off, on = (play_match(spec_of(ALL, seed=1, rules=rules, shield=s)) for s in (None, {}))
-    assert off.row["breaches_teammate_2.5m"] > 0
-    assert on.row["breaches_teammate_2.5m"] == 0
-    assert read_meta(on.record)["title"] == "medium – medium, 0.3 s delay, 0.5 m position noise, 0.3 m/s current"
 
 
 def test_a_current_that_nobody_comes_back_against_is_refused():

@@ -9,12 +9,12 @@ from steerclear.env.record import read_meta
 from steerclear.env.render import Arena, Picture, Scene
 from steerclear.env.render.boats import boats_in_breach
 from steerclear.experiments.cli_games import STEERING
-from steerclear.experiments.play.match import Match, play_match, read_infos
+from steerclear.experiments.play.match import Match, play_match
 from steerclear.experiments.play.openings import GAP_M, opening
 from steerclear.experiments.play.spec import MatchSpec
 from steerclear.policies.entrants.play import EntrantTeam
 from steerclear.policies.keyboard import AHEAD, BACK, LEFT, RIGHT
-from steerclear.shield.exceptions import ConfigError, SteerclearError
+from steerclear.shield.exceptions import ConfigError
 
 SHORT = {"max_time_s": 6.0}
 
@@ -48,32 +48,13 @@ class Made:
         return {agent_id: self.answer(self.step, agent_id) for agent_id in self.ids}
 
 
-def test_a_game_without_a_shield_is_counted_and_recorded():
-    result = play_match(spec_of())
-    row, meta = result.row, read_meta(result.record)
-    assert (row["steps"], row["duration_s"]) == (60, pytest.approx(6.0))
-    assert (row["shielded"], row["covered_steps"], row["decision_p50_us"]) == (False, 0, None)
-    assert result.record["position"].shape == (61, 6, 2)
-    assert meta["policies"] == {"blue": "medium", "red": "easy"}
-    assert meta["shielded"] == []
-    np.testing.assert_array_equal(result.record["wanted"], result.record["sent"])
-
-
-def test_a_shielded_game_covers_one_team_and_times_its_decisions():
-    result = play_match(spec_of(shield={}, side="red"))
-    reason = result.record["reason"]
-    assert read_meta(result.record)["shielded"] == ["agent_3", "agent_4", "agent_5"]
-    assert (reason[:, :3] == 6).all()
-    assert (reason[:, 3:] != 6).all()
-    assert result.row["covered_steps"] == 3 * 60
-    assert result.row["decision_p50_us"] > 0.0
-    assert sum(count for name, count in result.row.items() if name.startswith("reason_")) == 180
-
-
 def test_the_same_spec_is_the_same_game_to_the_bit_and_another_seed_is_not():
     first, again = play_match(spec_of(shield={})), play_match(spec_of(shield={}))
     for name, array in first.record.items():
         np.testing.assert_array_equal(array, again.record[name])
+    off = play_match(spec_of())
+    for name in ("position", "heading_deg"):
+        np.testing.assert_array_equal(off.record[name][0], first.record[name][0], "off and on start alike")
     other = play_match(spec_of(shield={}, seed=1))
     assert not np.array_equal(first.record["position"], other.record["position"])
 
@@ -83,19 +64,6 @@ def test_the_record_and_the_game_agree_on_collisions():
     row = match.play().row
     team = match.env.core.collisions[0, :3]
     assert row["collisions"] == team.sum() > 0
-
-
-def test_off_and_on_start_from_the_same_places():
-    off, on = play_match(spec_of(seed=3)), play_match(spec_of(seed=3, shield={}))
-    np.testing.assert_array_equal(off.record["position"][0], on.record["position"][0])
-    np.testing.assert_array_equal(off.record["heading_deg"][0], on.record["heading_deg"][0])
-
-
-def test_a_shield_changes_commands_and_keeps_rammers_off():
-    off = play_match(spec_of("rammer", "rammer", rules={"max_time_s": 40.0}))
-    on = play_match(spec_of("rammer", "rammer", rules={"max_time_s": 40.0}, shield={}))
-    assert off.row["breaches_opponent_2.5m"] > on.row["breaches_opponent_2.5m"]
-    assert on.row["changed_steps"] > 0
 
 
 @pytest.mark.parametrize(
@@ -126,17 +94,6 @@ def test_a_policy_that_forgets_a_boat_or_answers_no_dict_holds(custom, caplog):
     assert "KeyError" in row["first_failure"]
 
 
-def test_a_submission_that_raises_is_reported(tmp_path, caplog):
-    (tmp_path / "solution.py").write_text(
-        "class solution:\n"
-        "    def compute_action(self, agent_id, full_obs_normalized, full_obs, global_state):\n"
-        "        raise RuntimeError('sunk')\n"
-    )
-    row = play_match(spec_of(str(tmp_path), "easy", shield={})).row
-    assert row["policy_failures"] == 3 * 60
-    assert "sunk" in row["first_failure"]
-
-
 def test_a_watcher_may_end_the_game():
     seen = []
 
@@ -148,15 +105,6 @@ def test_a_watcher_may_end_the_game():
     assert seen == sorted(seen)
 
 
-@pytest.mark.parametrize(
-    "settings",
-    [{"own": "nobody"}, {"rules": {"max_tme_s": 3}}, {"shield": {"separation": 3}}, {"shield": {"separation_m": -1.0}}],
-)
-def test_an_unusable_spec_is_refused(settings):
-    with pytest.raises(SteerclearError):
-        play_match(replace(spec_of(), **settings))
-
-
 def test_a_spec_travels_through_json_and_its_key_names_the_game():
     spec = spec_of(shield={"separation_m": 3.0})
     assert MatchSpec.of_job(json.loads(json.dumps(spec.as_job()))).key == spec.key
@@ -165,8 +113,7 @@ def test_a_spec_travels_through_json_and_its_key_names_the_game():
     assert replace(spec, files=("12ab", "")).key not in (spec.key, replace(spec, files=("", "12ab")).key)
 
 
-@pytest.mark.parametrize("preset", ["aamas2024", "mctf2025"])
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize(("preset", "seed"), [("aamas2024", 0), ("aamas2024", 1), ("mctf2025", 0), ("mctf2025", 1)])
 def test_openings_leave_room(preset, seed):
     config = GameConfig.preset(preset)
     start = opening(config, seed)
@@ -189,9 +136,6 @@ def test_an_opening_stays_clear_of_obstacles_and_says_when_there_is_no_room():
     assert np.linalg.norm(place - [20.0, 20.0]) > 4.0 + GAP_M
 
 
-SPEC = MatchSpec(preset="aamas2024", own="ohto", opponent="medium", rules={"max_time_s": 1.0}, judge="none")
-
-
 class Curious(EntrantTeam):
     """An entrant that looks at its infos."""
 
@@ -203,29 +147,17 @@ class Curious(EntrantTeam):
         return super().act(observations, infos)
 
 
-@pytest.mark.parametrize(
-    ("teams", "read"),
-    [
-        ([policies.make("ohto"), policies.make("hard")], False),
-        ([policies.make("ohto"), policies.from_callable(lambda obs: 4)], True),
-        ([Curious(), policies.make("medium")], True),
-    ],
-)
-def test_infos_are_written_where_somebody_may_read_them(teams, read):
-    assert read_infos(teams) == read
-
-
-def test_a_policy_that_reads_infos_gets_them_in_a_match():
-    game = Match(SPEC)
-    curious = Curious()
-    game.seat(0, curious)
+@pytest.mark.parametrize("team", [None, Curious(), policies.from_callable(lambda obs: 4)])
+def test_infos_are_written_where_somebody_may_read_them(team):
+    spec = MatchSpec(preset="aamas2024", own="ohto", opponent="medium", rules={"max_time_s": 1.0}, judge="none")
+    game = Match(spec)
+    if team is not None:
+        game.seat(0, team)
     game.play()
     game.close()
-    assert curious.seen == set(game.env.possible_agents)
-    game = Match(SPEC)
-    game.play()
-    game.close()
-    assert game.env.infos() == {}
+    assert (game.env.infos() != {}) == (team is not None)
+    if isinstance(team, Curious):
+        assert team.seen == set(game.env.possible_agents)
 
 
 def drawn(record, **changes):
@@ -240,11 +172,7 @@ def test_the_steered_boat_is_ringed_and_the_keys_stand_below(game_record):
     assert changed[-40:].any(), "the keys"
     assert changed[62:-40].any(), "the ring and the name"
     assert not (drawn(game_record, steered=frozenset()) != plain).any()
-
-
-@pytest.mark.parametrize("keys", [AHEAD, BACK, LEFT, RIGHT])
-def test_the_keys_told_are_those_that_are_read(keys):
-    assert all(key in STEERING.replace(",", "").replace(":", "").split() for key in keys)
+    assert set(STEERING.replace(",", "").replace(":", "").split()) >= AHEAD | BACK | LEFT | RIGHT
 
 
 @pytest.mark.parametrize(("own", "opponent", "steered"), [

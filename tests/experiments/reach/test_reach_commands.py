@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from steerclear.experiments import cli
+from commands import run as command
 from steerclear.experiments import cli_reach as reach
 from steerclear.experiments.console import ExitCode
 from steerclear.experiments.docs import write_pages
@@ -11,7 +11,6 @@ from steerclear.experiments.reach.pages import tables_page
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.tables import make
 from steerclear.shield.tables.files import CACHE_VARIABLE, SHIPPED, read_table, save_table
-from typer.testing import CliRunner
 
 HERON = SHIPPED / "heron-heron-worst-case.npz"
 
@@ -38,7 +37,7 @@ def tiny(monkeypatch):
 
 
 def run(*arguments):
-    return CliRunner().invoke(cli.app, ["reach", *(str(argument) for argument in arguments)])
+    return command("reach", *arguments)
 
 
 def flat(text):
@@ -109,7 +108,7 @@ def test_checks_can_fail(tmp_path):
 
 
 def test_the_page_of_tables_is_made_of_their_cards(tmp_path):
-    done = CliRunner().invoke(cli.app, ["docs", str(HERON), "--out", str(tmp_path)])
+    done = command("docs", HERON, "--out", tmp_path)
     assert done.exit_code == ExitCode.OK, done.output
     text, card = (tmp_path / "table_cards.md").read_text(), read_table(HERON).card
     assert text == tables_page([card.to_json()])

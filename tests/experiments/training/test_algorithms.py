@@ -1,18 +1,19 @@
-"""QMIX, and QMIX with PPO behind it."""
+"""QMIX, QMIX with PPO behind it, and cloning: a chooser of options that decides as a demonstrator does."""
 
 import json
 
 import numpy as np
 import pytest
 import torch
-from steerclear.experiments.cli import app
-from steerclear.experiments.training.config import read_config
+from commands import run
+from steerclear.experiments.training.cloning import fitted
+from steerclear.experiments.training.config import CloningOptions, read_config
 from steerclear.experiments.training.qmix import MonotoneMixer
 from steerclear.experiments.training.training import training_of
 from steerclear.policies import make_batch
 from steerclear.policies.entrants.learned import read_weights
+from steerclear.policies.entrants.learned.cloned import read_chooser
 from steerclear.shield.exceptions import ConfigError, PolicyError
-from typer.testing import CliRunner
 
 OPTIONS = {"batch": 8, "updates": 1}
 
@@ -27,17 +28,6 @@ def test_qmix_learns_from_a_replay_and_its_network_plays(tiny, tmp_path):
         values = training.agent(torch.as_tensor(seen)).numpy()
     np.testing.assert_allclose(network.outputs(seen, np.arange(30) % 3), values, atol=1e-5)
     assert json.loads((tmp_path / "run" / "curve.json").read_text())["rows"][-1]["evaluation"]["medium"]["games"] == 2
-
-
-def test_qmix_keeps_its_weights_where_the_evaluation_fails(tiny, tmp_path, monkeypatch):
-    def failing(*arguments):
-        raise RuntimeError("an opponent's file is gone")
-
-    monkeypatch.setattr("steerclear.experiments.training.training.play_games", failing)
-    training = training_of(read_config(tiny(algorithm="qmix", decisions=24)), tmp_path / "run", False)
-    with pytest.raises(RuntimeError, match="is gone"):
-        training.run()
-    assert read_weights(tmp_path / "run" / "final.npz").preset == "aamas2024"
 
 
 def test_one_network_plays_until_the_flag_is_held_and_another_learns_from_there(tiny, tmp_path):
@@ -64,7 +54,7 @@ def check_half_a_pair_is_refused(model, out):
         ("export", model, "--out", out),
         ("evaluate", f"sb3:{model}", "--trust", "--opponents", "hold", "--games", 1, "--out", out.parent / "x"),
     ):
-        result = CliRunner().invoke(app, [str(word) for word in words])
+        result = run(*words)
         assert result.exit_code == 2, result.output
         assert "holds one network of two" in result.stderr
         assert "final.npz" in result.stderr
@@ -86,3 +76,21 @@ def test_the_mixture_never_falls_where_a_value_rises():
 def test_what_begins_anew_does_not_resume(tiny, tmp_path, algorithm):
     with pytest.raises(ConfigError, match="leave out --resume"):
         training_of(read_config(tiny(algorithm=algorithm)), tmp_path, True)
+
+
+def test_a_clone_agrees_with_a_rule_it_was_shown():
+    rng = np.random.default_rng(0)
+    rows = []
+    for _ in range(600):
+        x, y = rng.uniform(0, 80), rng.uniform(0, 40)
+        rows.append({"time_s": 0.0, "option": "attack" if x + y > 60 else "guard", "own_x": x, "own_y": y})
+    _, curve = fitted(rows, CloningOptions(epochs=60, rate=1e-2, hidden=16, batch=64), 0, {})
+    assert curve[-1]["agrees"] > 0.93
+
+
+def test_cloning_ends_in_a_chooser_that_can_be_read(tiny, tmp_path):
+    config = tiny(algorithm="cloning", options={"epochs": 20}, rules={"max_time_s": 12.0})
+    training_of(read_config(config), tmp_path / "run", False).run()
+    chooser = read_chooser(tmp_path / "run" / "best.npz")
+    assert chooser.card["demonstrations"] == "scripted demonstrator"
+    assert "own_x" in chooser.names

@@ -10,12 +10,11 @@ import time
 import numpy as np
 import pytest
 import yaml
+from commands import run as call
 from steerclear import policies
 from steerclear.env import mctf_v0
 from steerclear.env.config import GameConfig
-from steerclear.experiments.cli import app
 from steerclear.policies.entrants.learned import read_weights
-from typer.testing import CliRunner
 
 STEERCLEAR = [sys.executable, "-m", "steerclear.experiments.cli"]
 LEAGUE = {
@@ -27,14 +26,15 @@ LEAGUE = {
 """Snapshots of which one is kept, so that they leave the pool while games against them go on."""
 
 
-def call(*words):
-    return CliRunner().invoke(app, [str(word) for word in words])
-
-
 def curve_of(folder):
     """The curve without times."""
     rows = json.loads((folder / "curve.json").read_text())["rows"]
     return [{name: value for name, value in row.items() if name != "wall"} for row in rows]
+
+
+def kept_in(run):
+    """The number of the newest checkpoint."""
+    return max((int(path.stem) for path in run.glob("checkpoints/[0-9]*.zip")), default=0)
 
 
 def same_networks(one, two):
@@ -42,13 +42,13 @@ def same_networks(one, two):
     return all(np.array_equal(mine, other) for mine, other in pairs)
 
 
-def stopped(words, number, there):
-    """Run a command until something is there, then send it a signal; its exit status."""
+def stopped(words, number, run):
+    """Run a training until it has kept two more checkpoints, then send it a signal; its exit status."""
     process = subprocess.Popen(
         [*STEERCLEAR, *map(str, words)], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL, start_new_session=True
     )
-    until = time.monotonic() + 300.0
-    while not there() and process.poll() is None and time.monotonic() < until:
+    until, before = time.monotonic() + 300.0, kept_in(run)
+    while kept_in(run) <= before + 1 and process.poll() is None and time.monotonic() < until:
         time.sleep(0.01)
     os.kill(process.pid, number)
     return process.wait(timeout=120)
@@ -74,12 +74,14 @@ def test_a_training_leaves_its_files(unbroken):
         assert (run / name).stat().st_size > 0
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
-def test_stopped_in_whatever_way_a_training_goes_on_to_the_same_curve(unbroken, tmp_path, number):
+def test_stopped_in_whatever_way_a_training_goes_on_to_the_same_curve(unbroken, tmp_path):
+    """First by SIGTERM, and what goes on from there by SIGKILL."""
     run = tmp_path / "run"
     words = ("train", unbroken / "league.yaml", "--out", run)
-    status = stopped(words, number, lambda: len(list(run.glob("checkpoints/[0-9]*"))) > 1)
-    assert status == (-number if number == signal.SIGKILL else 130) or (run / "model.zip").exists()
+    for number, status in ((signal.SIGTERM, 130), (signal.SIGKILL, -9)):
+        more = () if number == signal.SIGTERM else ("--resume",)
+        left = stopped([*words, *more], number, run)
+        assert left == status or (run / "model.zip").exists()
     again = call(*words, "--resume")
     assert again.exit_code == 0, again.output
     assert curve_of(run) == curve_of(unbroken / "run")

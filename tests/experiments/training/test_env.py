@@ -16,15 +16,18 @@ def env_of(stages=(HOLD,), first=None, **content):
     return TrainEnv(config_of({**given, "evaluation": {"opponents": ["hold"]}}), first)
 
 
-def test_an_unknown_reward_of_a_later_stage_is_found_at_once():
-    with pytest.raises(ConfigError, match="unknown reward term 'capture'; did you mean captures"):
-        env_of([HOLD, {**HOLD, "rewards": {"capture": 1.0}}])
-
-
-@pytest.mark.parametrize("rules", [{"team_size": 2}, {"env_bounds_m": [60.0, 40.0]}, {"platforms": "surveyor"}])
-def test_rules_of_a_stage_by_which_boats_see_otherwise_are_refused(rules):
-    with pytest.raises(ConfigError, match="change what boats see"):
-        env_of([HOLD, {**HOLD, "rules": rules}])
+@pytest.mark.parametrize(
+    ("stage", "words"),
+    [
+        ({"rewards": {"capture": 1.0}}, "unknown reward term 'capture'; did you mean captures"),
+        ({"rules": {"team_size": 2}}, "change what boats see"),
+        ({"rules": {"env_bounds_m": [60.0, 40.0]}}, "change what boats see"),
+        ({"rules": {"platforms": "surveyor"}}, "change what boats see"),
+    ],
+)
+def test_a_later_stage_that_cannot_be_is_found_at_once(stage, words):
+    with pytest.raises(ConfigError, match=words):
+        env_of([HOLD, {**HOLD, **stage}])
 
 
 def test_a_stage_may_have_rewards_rules_and_a_shield_of_its_own():

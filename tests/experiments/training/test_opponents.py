@@ -6,15 +6,9 @@ from steerclear.experiments.training.config import SELF, League, Stage, config_o
 from steerclear.experiments.training.env import core_of
 from steerclear.experiments.training.opponents import EachGame, Pool
 from steerclear.policies.entrants.learned.network import Features, Network
-from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.platforms import layout as L
 
 NONE = Features(np.zeros(0, np.int64), np.zeros(0, np.int64), 0.0)
-
-
-def test_a_missing_opponent_is_found_at_once():
-    with pytest.raises(PolicyError, match="unknown policy 'mediun'; did you mean medium"):
-        Pool(Stage(opponents=("mediun",)), League(), 0)
 
 
 def test_those_who_beat_the_learner_come_more_often():
@@ -43,25 +37,6 @@ def test_a_game_keeps_its_opponent_to_its_end():
     pool.restart(np.ones(20, np.bool_), 1)
     assert set(pool.playing) == {"hold", "self_2"}
     assert set(pool.members) == {"hold", "self_2"}
-
-
-def test_opponents_of_a_stage_wait_longer_between_tags_and_the_learners_as_the_rules_say():
-    core = core_of(config_of({"rules": {"tagging_cooldown_s": 10.0}}), 1, 0)
-    pool = Pool(Stage(opponents=("hold",), cooldown_s=40.0), League(), 0)
-    core.reset(seed=0)
-    pool.reset(core, 1, 0)
-    core.tagging_cooldown_s[:] = 0.0
-    ready = core.config.tagging_cooldown_s
-    waited = {0: [], 1: []}
-    for k in range(420):
-        commands = np.zeros((1, core.n_boats, 2))
-        commands[:, 3:] = pool.act(core, 1)
-        core.step(commands)
-        for team in waited:
-            if (core.tagging_cooldown_s[0, core.team == team] == ready).all():
-                waited[team].append((k + 1) * core.config.decision_s)
-    assert min(waited[0]) == pytest.approx(10.0, abs=0.11)
-    assert min(waited[1]) == pytest.approx(40.0, abs=0.5)
 
 
 def test_each_game_draws_how_long_its_opponents_wait_and_anew_when_it_begins_anew():

@@ -47,27 +47,18 @@ def test_a_way_that_ends_in_a_tag_earns_nothing():
     assert played(Progress(), game(), TAGGED) > 0.1
 
 
+KEPT = (20.0 + 10.0) / 80.0
+"""What the way to the capture earned: 20 m to the flag, 10 m home with it, in widths."""
+
+
 def test_a_capture_keeps_what_it_earned():
     batch, term = game(), Advance()
     earned = played(term, batch, BROUGHT_HOME)
     assert earned > 0.3
-    lost = played_on(term, batch, [(45, 0, 0, 0), (45, 0, 1, 0)])
-    assert abs(earned + lost - kept_at_home()) < 1e-9
+    term.begin = lambda batch, games: None  # it goes on
+    lost = played(term, batch, [(45, 0, 0, 0), (45, 0, 1, 0)])
+    assert abs(earned + lost - KEPT) < 1e-9
     assert played(TERMS["own"](), game(), BROUGHT_HOME) == 3.0
-
-
-def played_on(term, batch, moments):
-    """As `played`, without a new beginning."""
-    begin, term.begin = term.begin, lambda batch, games: None
-    try:
-        return played(term, batch, moments)
-    finally:
-        term.begin = begin
-
-
-def kept_at_home():
-    """What the way to the capture earned: 20 m to the flag, 10 m home with it, in widths."""
-    return (20.0 + 10.0) / 80.0
 
 
 def test_who_tags_is_paid_and_nobody_else():
@@ -100,6 +91,6 @@ def earned_by_defending(moments):
 
 
 def test_a_tag_gives_the_defenders_what_the_tagged_boat_had_gained():
-    np.testing.assert_allclose(earned_by_defending(TAGGED[:3]), -(20.0 + 10.0) / 80.0)
+    np.testing.assert_allclose(earned_by_defending(TAGGED[:3]), -KEPT)
     np.testing.assert_allclose(earned_by_defending(TAGGED), 0.0, atol=1e-12)
-    np.testing.assert_allclose(earned_by_defending(BROUGHT_HOME), -kept_at_home() + 1.0 / 80.0)  # it sails 1 m off
+    np.testing.assert_allclose(earned_by_defending(BROUGHT_HOME), -KEPT + 1.0 / 80.0)  # it sails 1 m off

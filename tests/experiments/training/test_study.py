@@ -73,7 +73,9 @@ def test_a_folder_of_another_config_is_not_gone_on_with(tmp_path):
 def test_a_study_comes_to_the_same_results_whatever_happens_to_it(tiny_content, tmp_path):
     """One training was stopped after an evaluation had left weights, one spoiled, and another process goes on."""
     told, tiny = [], {**tiny_content, "decisions": 72, "stages": [{"opponents": ["hold"]}]}
-    base = config_of({**tiny, "evaluation": {"every": 1, "games": 1, "opponents": ["hold"]}})
+    base = config_of(
+        {**tiny, "rules": {"max_time_s": 3.0}, "evaluation": {"every": 1, "games": 1, "opponents": ["hold"]}}
+    )
     rows = run_study(base, tmp_path / "whole", 1, 1, lambda done, of: told.append((done, of)))["rows"]
     assert [(row["shield"], row["collision"]) for row in rows] == [
         (shield, collision) for collision in ("off", "on") for shield in SHIELDS

@@ -3,15 +3,9 @@ import sys
 import zipfile
 from pathlib import Path
 
-from steerclear.experiments import cli_train as train
-from steerclear.experiments.cli import app
-from steerclear.experiments.result_files import lock_folder
+from commands import run as call
+from filelock import FileLock
 from steerclear.policies.submissions.made_for import made_for
-from typer.testing import CliRunner
-
-
-def call(*words):
-    return CliRunner().invoke(app, [str(word) for word in words])
 
 
 def test_train_export_and_play_as_the_page_tells(tiny, tmp_path):
@@ -57,11 +51,12 @@ def test_a_training_without_a_terminal_tells_how_far_it_is(tiny, tmp_path, monke
     assert "nothing was left to do: all 36 decisions were made before" in again.stderr
 
 
-def test_a_training_has_its_folder_alone(tiny, tmp_path, monkeypatch):
-    held = []
-    monkeypatch.setattr(train, "_run", lambda training, folder: held.append(lock_folder(folder).lock_counter))
-    assert call("train", tiny(), "--out", tmp_path / "alone").exit_code == 0
-    assert held == [2], "the command's own, and this one of the same process"
+def test_a_training_has_its_folder_alone(tiny, tmp_path):
+    (tmp_path / "alone").mkdir()
+    with FileLock(tmp_path / "alone" / ".lock"):
+        refused = call("train", tiny(), "--out", tmp_path / "alone")
+    assert refused.exit_code == 2
+    assert "another process" in refused.output
 
 
 def test_a_shield_of_another_step_is_found_before_the_first_rollout(tiny, tmp_path):

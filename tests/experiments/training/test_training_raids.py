@@ -20,9 +20,6 @@ from steerclear.policies.entrants.undertow.shape import NAMES
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import layout as L
 
-PLACES = [[38.0, 36.0], [38.0, 4.0], [35.0, 30.0], [20.0, 20.0], [22.0, 20.0], [60.0, 20.0]]
-"""Boats of a game in which a raid begins."""
-
 
 def moments_of(core, times_s):
     """Moments of a game whose boats sail circles, one of each kind, after so many seconds."""
@@ -84,23 +81,6 @@ def test_a_mirrored_game_goes_on_as_the_mirror_of_the_game_and_so_does_its_raid(
     np.testing.assert_allclose(*recorder.seen(np.arange(2)), atol=1e-5)
 
 
-def test_a_recorder_keeps_the_moment_a_raid_begins():
-    core = core_of(config_of({}), 1, 1)
-    core.reset(seed=1)
-    for boat, at in enumerate(PLACES):
-        core.games.state[0, boat, [L.X, L.Y]] = at
-    core.games.on_side[:] = True
-    core.observe()
-    recorder = Recorder(10, 0.0, 1, pool_of(core))
-    recorder.reset(core, 0, 1)
-    recorder.advance(np.arange(1))
-    found = [(memory[0], KINDS[kind], opponent) for _, memory, kind, opponent in recorder.found]
-    assert found == [(Phase.BAIT, "bait", "hold")]
-    assert BeginInRaids(core, recorder.found, [1, 0, 0, 0, 0, 0], 1).moments == recorder.found
-    with pytest.raises(ConfigError, match="no raid came to 'drag'"):
-        BeginInRaids(core, recorder.found, [1, 1, 0, 0, 0, 0], 1)
-
-
 def test_a_boat_that_sails_alone_is_recorded_and_its_games_begin_against_the_same_opponent_and_last(tiny, tmp_path):
     changes = {"stages": [{"opponents": ["hold", "hard"]}], "decisions": 1}
     changes["options"] = {"recorded": [0.0], "shares": [0, 0, 0, 0, 1, 0]}
@@ -115,10 +95,12 @@ def test_a_boat_that_sails_alone_is_recorded_and_its_games_begin_against_the_sam
     assert training.batch.core.time_s.min() > 30.0  # though no raid lasts as long as 40 decisions
 
 
-def test_games_that_are_too_short_for_raids_are_one_error():
+def test_games_in_which_no_raid_can_begin_are_one_error(tiny, tmp_path):
     config = config_of({"algorithm": "raids", "games": 1, "rules": {"max_time_s": 1.0}})
     with pytest.raises(ConfigError, match="no raid came to 'bait'"):
         BeginInRaids(core_of(config, 1, 1), recorded(config, 0.0, 1), [1] * 6, 1)
+    with pytest.raises(ConfigError, match="teams of 3 boats"):
+        training_of(tiny_raids(tiny, rules={"team_size": 2}), tmp_path / "run", False)
 
 
 def learner(**ppo):
@@ -146,20 +128,6 @@ def test_gains_look_ahead_over_the_time_that_answers_are_held():
     gains, values = one._gains([[first, last], [cut]], answers, one._tensor(np.stack([seen] * 3)))
     np.testing.assert_allclose(values, 8.0)
     np.testing.assert_allclose(gains, [1.0 + 0.25 * 4.0 - 8.0, 4.0 - 8.0, 1.0 + 0.125 * 8.0 - 8.0])
-
-
-def test_what_earns_more_is_answered_more_but_not_while_the_critic_learns_alone():
-    one, rng = learner(critic_first=2, discount=0.9), np.random.default_rng(1)
-    moved = []
-    for _ in range(12):
-        given = one.answers(rng.normal(size=(256, SEEN)).astype(np.float32))
-        for answer in given:
-            answer.earned, answer.decisions = float(answer.units[3]), 1
-        one.learn([[answer] for answer in given])
-        moved.append(one.network({}).outputs(np.zeros((1, SEEN), np.float32), np.zeros(1, np.int64))[0])
-    assert np.abs(moved[1]).max() < 0.05
-    assert moved[-1][3] > 2.0
-    assert np.abs(np.delete(moved[-1], 3)).max() < 1.0
 
 
 def tiny_raids(tiny, **changes):
@@ -197,8 +165,3 @@ def test_a_training_begins_in_raids_and_its_network_plays_and_is_begun_with(tiny
     wider = begun.model_copy(update={"net": Net(hidden=(17,))})
     with pytest.raises(ConfigError, match="start does not fit"):
         training_of(wider, tmp_path / "wider", False)
-
-
-def test_raids_are_for_teams_of_three(tiny, tmp_path):
-    with pytest.raises(ConfigError, match="teams of 3 boats"):
-        training_of(tiny_raids(tiny, rules={"team_size": 2}), tmp_path / "run", False)

@@ -1,7 +1,7 @@
-"""The comparison of guards: who met the same encounters, figures over families, the page."""
+"""Pages of results: the comparison of filters, the price, the keys of JSON; what no page can be made of."""
 
 import pytest
-from steerclear.experiments.docs import price_page, write_pages
+from steerclear.experiments.docs import KEYS, price_page, write_pages
 from steerclear.experiments.docs_encounters import best_of, comparison_page, pool
 from steerclear.shield.exceptions import ConfigError
 
@@ -33,44 +33,6 @@ def both(first="head_on", second="rammer_1"):
     )  # fmt: skip
 
 
-def page_of(folder, *contents):
-    return comparison_page(contents, folder)[1]
-
-
-def test_counts_add_up_and_means_are_weighted():
-    cells = (
-        cell("a", "head_on", breached=3, avoidable=1, changed=10.0, n=100),
-        cell("a", "rammer_1", breached=2, changed=40.0, n=300, goal_time_ratio=None),
-    )
-    figures = pool(cells)
-    assert (figures["encounters"], figures["breached"], figures["avoidable"]) == (400, 5, 1)
-    assert figures["changed_percent"] == pytest.approx((10 * 100 + 40 * 300) / 400)
-    assert figures["goal_time_ratio"] == pytest.approx(1.1)
-
-
-def test_best_is_safe_first_then_gentle(tmp_path):
-    assert ": **cautious**." in page_of(tmp_path, both())
-    gentle = content(cell("gentle", "head_on", changed=30.0), cell("gentle", "rammer_1", changed=50.0))
-    assert ": **gentle**." in page_of(tmp_path, both(), gentle)
-    assert best_of({"none": pool([cell("none", "head_on")])}) is None
-
-
-def test_breaches_nobody_judged_are_not_taken_for_unavoidable(tmp_path):
-    unjudged = cell("hidden", "head_on", breached=1, changed=1.0, not_judged=1, unavoidable=0)
-    text = page_of(tmp_path, content(unjudged, cell("open", "head_on", changed=90.0)))
-    assert ": **open**." in text
-    assert "| hidden | 100 | 0 to 1 [4.7 %] | 0 | 1 | 1 [4.7 %] |" in text
-
-
-def test_only_families_that_all_met_count(tmp_path):
-    extra = content(cell("bold", "crossing_left", breached=50), cell("late", "head_on", changed=2.0))
-    text = page_of(tmp_path, both(), extra)
-    assert "Families: head_on; seed 7. Not met equally by all guards and left out: rammer_1, crossing_left." in text
-    assert "| **bold** | 100 |" in text
-    with pytest.raises(ConfigError, match="no family that all guards met"):
-        page_of(tmp_path, both(), content(cell("late", "head_on", n=50)))
-
-
 def test_the_page_shows_what_the_results_say(tmp_path):
     page, picture = (
         path for path in write_pages([both()], tmp_path) if path.name in ("comparison.md", "comparison.png")
@@ -83,29 +45,18 @@ def test_the_page_shows_what_the_results_say(tmp_path):
     assert picture.read_bytes()[:4] == b"\x89PNG"
 
 
-def test_of_one_guard_every_family_has_its_figures(tmp_path):
-    cells = [
-        cell("shield", "head_on", n=1000),
-        cell("shield", "at_rest", breached=99, avoidable=90, changed=60.0, never_arrived_percent=2.0),
-    ]
-    lines = page_of(tmp_path, content(*cells)).splitlines()
-    assert any(
-        line.startswith("| head_on | 1,000 | 0 [0.3 %] | 0 | 0 | 0 [0.3 %] | 0 [0.3 %] | 5.0 % |") for line in lines
-    )
-    assert any(
-        line.startswith("| at_rest | 100 | 90 [94 %] | 9 | 0 | 99 [100 %] | 99 [100 %] | 60.0") for line in lines
-    )
-    assert lines[0] == "# Encounters with shield"
-    assert not any("Best" in line or "**shield**" in line for line in lines)
-
-
-def test_bad_results_are_refused(tmp_path):
-    broken = cell("a", "head_on")
-    del broken["avoidable"]
-    with pytest.raises(ConfigError, match="has no avoidable; run `encounters` again"):
-        write_pages([content(broken)], tmp_path)
-    with pytest.raises(ConfigError, match="no family that all guards met"):
-        write_pages([content()], tmp_path)
+def test_only_families_that_all_met_count_and_breaches_nobody_judged_are_not_taken_for_unavoidable(tmp_path):
+    gentle = content(cell("gentle", "head_on", changed=30.0), cell("gentle", "crossing_left", changed=50.0))
+    hidden = content(cell("hidden", "head_on", breached=1, changed=1.0, not_judged=1, unavoidable=0))
+    text = comparison_page([both(), gentle, hidden], tmp_path)[1]
+    assert "Families: head_on; seed 7. Not met equally by all guards and left out: rammer_1, crossing_left." in text
+    assert ": **bold**." in text, "of those that are safe the gentlest"
+    assert "| hidden | 100 | 0 to 1 [4.7 %] | 0 | 1 | 1 [4.7 %] |" in text
+    assert best_of({"none": pool([cell("none", "head_on")])}) is None
+    alone = comparison_page([content(cell("shield", "head_on", n=1000))], tmp_path)[1]
+    assert alone.startswith("# Encounters with shield")
+    assert "| head_on | 1,000 | 0 [0.3 %] | 0 | 0 | 0 [0.3 %] | 0 [0.3 %] | 5.0 % |" in alone
+    assert "Best" not in alone
 
 
 def figure(value):
@@ -148,8 +99,29 @@ def test_ablations_of_several_horizons_make_the_page_of_the_price(tmp_path):
     assert price_page(results, tmp_path)[2][0].stat().st_size > 10_000
 
 
-def test_bad_ablations_are_refused_in_one_line(tmp_path):
-    with pytest.raises(ConfigError, match="no page can be made of results of 'nothing'"):
-        write_pages([{"command": "nothing"}], tmp_path)
-    with pytest.raises(ConfigError, match="make them again"):
-        write_pages([ablation({}, 1.0, 0.0)], tmp_path)
+def test_the_page_of_keys_holds_every_key(tmp_path):
+    write_pages([], tmp_path)
+    text = (tmp_path / "json_keys.md").read_text()
+    assert all(f"`{key}`" in text for keys in KEYS.values() for key in keys)
+
+
+def test_what_no_page_can_be_made_of_is_refused(tmp_path):
+    broken = cell("a", "head_on")
+    del broken["avoidable"]
+    evaluation = {"command": "evaluate", "settings": {"preset": "aamas2024", "own": "medium", "games": 1, "rules": {}}}
+    evaluation |= {"quick": False, "seeds": [0], "versions": {"steerclear": "1"}, "goals": [], "pairings": []}
+    for contents, words in (
+        ([content(broken)], "has no avoidable; run `encounters` again"),
+        ([content()], "no family that all guards met"),
+        (
+            [{"command": "parity"}],
+            "ablate, evaluate, tournament, bench, encounters, reach compare",
+        ),
+        ([evaluation] * 2, r"two of the results make evaluation_aamas2024\.md; give them one at a time"),
+        ([ablation({}, 1.0, 0.0)], "make them again"),
+    ):
+        with pytest.raises(ConfigError, match=words):
+            write_pages(contents, tmp_path)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ConfigError, match="choose another --out"):
+        write_pages([], tmp_path / "file" / "docs")

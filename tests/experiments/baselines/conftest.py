@@ -1,1 +1,0 @@
-"""Makes this folder's helpers importable from the folders inside it."""
