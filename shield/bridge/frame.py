@@ -20,17 +20,13 @@ TWO_PI = 2.0 * math.pi
 class FieldFrame:
     """A local tangent plane (WGS 84) at the field's corner, turned so that its y axis points along ``y_axis_deg``.
 
-    Attributes:
-        latitude_deg, longitude_deg: of the corner, deg.
-        y_axis_deg: true course of the field's y axis, deg clockwise from north.
-
     Raises:
         ConfigError: a value is not finite or not on earth.
     """
 
-    latitude_deg: float
+    latitude_deg: float  # of the corner, deg
     longitude_deg: float
-    y_axis_deg: float = 0.0
+    y_axis_deg: float = 0.0  # true course of the field's y axis, deg clockwise from north
 
     def __post_init__(self) -> None:
         if not (abs(self.latitude_deg) <= 89.0 and abs(self.longitude_deg) <= 180.0):

@@ -20,8 +20,7 @@ from .fleet_file import FleetFile
 from .messages import Action, BoatReading, Sent
 
 AHEAD_S = (1.0, 2.0, 3.0)  # prediction horizons, s
-TOLD_BY = 1
-"""Index in `AHEAD_S` of the errors that set the margin: a backup is chosen anew long before it ends."""
+TOLD_BY = 1  # index in `AHEAD_S` of the errors that set the margin: a backup is chosen anew long before it ends
 SHARE = 0.95  # quantile of the errors that a margin covers
 MEMORY_S = 60.0  # time span of the errors remembered, s
 ENOUGH_S = 5.0  # least time span of errors before they count, s

@@ -21,15 +21,12 @@ from ..preflight_checks import CheckResult
 
 LOG = logging.getLogger(__name__)
 
-LATE_S, TALK_EVERY_S = 1.0, 30.0
-"""A disk that is so much behind is told, s, and again after the other."""
+LATE_S, TALK_EVERY_S = 1.0, 30.0  # a disk that is so much behind is told, s, and again after the other
 PAUSE_S = 0.5
 """Of the time between two things handed over no more than this counts against the disk, s: whoever hands them over
 stood still for the rest (a suspended process, say), and the thread may have, too."""
-BYTES_PER_BOAT_S = 6_000.0
-"""Generous size of the log per boat and second at 10 Hz: MCAP and tlog together."""
-SLOWEST_SYNC_S = 0.5
-"""A disk that takes longer than this to keep a second of log cannot hold it at most 1 s behind."""
+BYTES_PER_BOAT_S = 6_000.0  # generous size of the log per boat and second at 10 Hz: MCAP and tlog together
+SLOWEST_SYNC_S = 0.5  # a disk that takes longer than this to keep a second of log cannot hold it at most 1 s behind
 _CHUNK = 64 * 1024
 
 Item = TypeVar("Item")

@@ -130,8 +130,7 @@ COLUMNS: dict[str, tuple[type, str, type, tuple[int, ...]]] = {
     "solver": (Decisions, "solver", np.int64, ()),
 }
 """Values of a `BoatRecord` that are a row of an array: whose, its name there, its kind and shape."""
-_LATER = {"released", "released_by", "failsafe_over"}
-"""Parts of a reading that 0.8.0 did not know."""
+_LATER = {"released", "released_by", "failsafe_over"}  # parts of a reading that 0.8.0 did not know
 _READING = {entry.name for entry in dataclasses.fields(BoatReading)} - _LATER
 
 

@@ -20,13 +20,10 @@ from ..messages import Tick
 from .header import LogHeader
 
 Message = dict[str, Any]
-Color = tuple[float, float, float, float]
-"""Red, green, blue and alpha, 0 to 1."""
+Color = tuple[float, float, float, float]  # red, green, blue and alpha, 0 to 1
 
-FRAME = "field"
-"""Name of the frame: x and y of the field, z up."""
-DEBUG, INFO, WARNING, ERROR = 1, 2, 3, 4
-"""Levels of `foxglove.Log`."""
+FRAME = "field"  # name of the frame: x and y of the field, z up
+DEBUG, INFO, WARNING, ERROR = 1, 2, 3, 4  # levels of `foxglove.Log`
 SCHEMAS: dict[str, Message] = json.loads(files(__package__).joinpath("foxglove_schemas.json").read_text("utf-8"))
 """https://docs.foxglove.dev, by name."""
 LOG, LOCATION_FIX, SCENE_UPDATE = (SCHEMAS[name] for name in ("LOG", "LOCATION_FIX", "SCENE_UPDATE"))
@@ -37,8 +34,7 @@ _NOMINAL: Color = (0.6, 0.6, 0.6, 0.9)
 _FILTERED: Color = (0.1, 0.7, 0.2, 1.0)
 _CHANGED: Color = (1.0, 0.55, 0.0, 1.0)
 _FIXED: Color = (0.5, 0.5, 0.5, 1.0)
-_SCALE_S, _LIFETIME_S = 2.0, 1
-"""Command arrows reach as far as the boat would get in so many seconds."""
+_SCALE_S, _LIFETIME_S = 2.0, 1  # command arrows reach as far as the boat would get in so many seconds
 _PARTS = ("arrows", "cubes", "spheres", "cylinders", "lines", "triangles", "texts", "models", "metadata")
 
 

@@ -19,27 +19,19 @@ from typing import Any
 from ...compat import Self
 from ...exceptions import LogError
 
-ENDS = "log"
-"""How the closing link says that its file is whole."""
-MOST, MOST_BREAKS = 1 << 62, 20
-"""No log has so many records; breaks kept in words, further ones are counted."""
+ENDS = "log"  # how the closing link says that its file is whole
+MOST, MOST_BREAKS = 1 << 62, 20  # no log has so many records; breaks kept in words, further ones are counted
 _KEY_USE = b"steerclear black box"
 _BYTES = hashlib.sha256().digest_size
 
 
 @dataclass(frozen=True)
 class ChainHead:
-    """Where the chain of a file begins; part of its header.
+    """Where the chain of a file begins; part of its header."""
 
-    Attributes:
-        head: digest the first link builds on, drawn at random, hexadecimal.
-        count: records before it: 0.
-        keyed: whether links carry codes.
-    """
-
-    head: str
-    count: int = 0
-    keyed: bool = False
+    head: str  # digest the first link builds on, drawn at random, hexadecimal
+    count: int = 0  # records before it: 0
+    keyed: bool = False  # whether links carry codes
 
     @classmethod
     def new(cls) -> Self:
@@ -65,19 +57,12 @@ class ChainHead:
 
 @dataclass(frozen=True)
 class Link:
-    """A link of the log's chain: the digest of the records since the last link, and of that.
+    """A link of the log's chain: the digest of the records since the last link, and of that."""
 
-    Attributes:
-        count: records up to here, links left out.
-        digest: hexadecimal.
-        end: "" within a file, `ENDS` for the one that closes it.
-        code: with a key, hexadecimal; else "".
-    """
-
-    count: int
-    digest: str
-    end: str = ""
-    code: str = ""
+    count: int  # records up to here, links left out
+    digest: str  # hexadecimal
+    end: str = ""  # "" within a file, `ENDS` for the one that closes it
+    code: str = ""  # with a key, hexadecimal; else ""
 
     @classmethod
     def of(cls, content: Mapping[str, Any]) -> Self:
@@ -141,7 +126,6 @@ class ChainCheck:
         key: of links that carry codes, 32 bytes; None: codes are not looked at.
 
     Attributes:
-        chained: whether there is a chain at all.
         keyed: whether its links carry codes.
         codes_checked: how many codes were found right.
         breaks: what does not fit, in words, `MOST_BREAKS` at most.

@@ -26,10 +26,8 @@ from .format import object_schema, platform_from
 from .hash_chain import ChainHead
 from .nonfinite import plain, restored
 
-LOG_VERSION = 2
-"""Logs of version 1 (0.6 and before) are read by the program that wrote them."""
-LATEST_S = 1e12
-"""No clock of a loop tells a later time, s."""
+LOG_VERSION = 2  # logs of version 1 (0.6 and before) are read by the program that wrote them
+LATEST_S = 1e12  # no clock of a loop tells a later time, s
 PACKAGES = ("steerclear", "numpy", "numba", "llvmlite", "qpsolvers", "daqp", "osqp", "quadprog", "pymavlink", "mcap")
 """Distributions whose versions a log notes."""
 
@@ -81,66 +79,41 @@ def describe_machine() -> str:
 
 @dataclass(frozen=True)
 class LoggedBoat:
-    """One boat of the fleet file.
+    """One boat of the fleet file."""
 
-    Attributes:
-        name: of the boat.
-        agent: its place in the game, "" for a boat outside it.
-        team: 0 blue, 1 red, 2 outside the game.
-        platform: name of its platform.
-        ours: whether this process commands it.
-    """
-
-    name: str
-    agent: str
-    team: int
-    platform: str
-    ours: bool
+    name: str  # of the boat
+    agent: str  # its place in the game, "" for a boat outside it
+    team: int  # 0 blue, 1 red, 2 outside the game
+    platform: str  # name of its platform
+    ours: bool  # whether this process commands it
 
 
 @dataclass(frozen=True)
 class LogHeader:
-    """First message of a log.
+    """First message of a log."""
 
-    Attributes:
-        config: settings the shield was built with.
-        surroundings: static constraints it was built with.
-        platforms: parameters of the platforms, by name.
-        boats: of the fleet file, in its order.
-        frame: where the field is, None when it is nowhere on earth.
-        field_size_m: of the field along x and y, m.
-        fleet_text: the FLEET.yaml, word for word.
-        preset: rules of the game.
-        policy: name of the policy.
-        notes: anything else worth keeping, such as checks that were accepted.
-        clock_s: time on the loop's clock when the log began, s.
-        unix_ns: wall clock at that moment, ns since 1970; all times in the log are counted from it on the loop's clock.
-        versions: of Python and the packages that decisions depend on.
-        sources: digest of the sources of the shield.
-        tables: digests of the value tables for pairs of those platforms; None: those there are now.
-        machine: processor architecture, system and C library, which sines and cosines come from.
-        version: of the log's format.
-        chain: where the file's chain begins.
-    """
-
-    config: ShieldConfig
-    surroundings: Surroundings = OPEN_WATER
-    platforms: Mapping[str, Platform] = field(default_factory=dict)
-    boats: tuple[LoggedBoat, ...] = ()
-    frame: FieldFrame | None = None
-    field_size_m: tuple[float, float] | None = None
-    fleet_text: str = ""
-    preset: str = ""
-    policy: str = ""
+    config: ShieldConfig  # settings the shield was built with
+    surroundings: Surroundings = OPEN_WATER  # static constraints it was built with
+    platforms: Mapping[str, Platform] = field(default_factory=dict)  # parameters of the platforms, by name
+    boats: tuple[LoggedBoat, ...] = ()  # of the fleet file, in its order
+    frame: FieldFrame | None = None  # where the field is, None when it is nowhere on earth
+    field_size_m: tuple[float, float] | None = None  # of the field along x and y, m
+    fleet_text: str = ""  # the FLEET.yaml, word for word
+    preset: str = ""  # rules of the game
+    policy: str = ""  # name of the policy
+    # anything else worth keeping, such as checks that were accepted
     notes: Mapping[str, str] = field(default_factory=dict)
-    clock_s: float = 0.0
+    clock_s: float = 0.0  # time on the loop's clock when the log began, s
+    # wall clock at that moment, ns since 1970; all times in the log are counted from it on the loop's clock
     unix_ns: int = field(default_factory=time.time_ns)
-    versions: Mapping[str, str] = field(default_factory=versions)
-    sources: str = field(default_factory=source_digest)
+    versions: Mapping[str, str] = field(default_factory=versions)  # of Python and the packages that decisions depend on
+    sources: str = field(default_factory=source_digest)  # digest of the sources of the shield
+    # digests of the value tables for pairs of those platforms; None: those there are now
     tables: Mapping[str, str] | None = None
+    # processor architecture, system and C library, which sines and cosines come from
     machine: str = field(default_factory=describe_machine)
-    version: int = LOG_VERSION
-    chain: ChainHead = field(default_factory=ChainHead.new)
+    version: int = LOG_VERSION  # of the log's format
+    chain: ChainHead = field(default_factory=ChainHead.new)  # where the file's chain begins
 
     def __post_init__(self) -> None:
         if self.tables is None:

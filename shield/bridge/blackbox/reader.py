@@ -17,9 +17,8 @@ from mcap.records import Channel, Chunk, Footer, Message, Schema
 from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
 from zstandard import ZstdError
 
-from ...compat import Self
 from ...exceptions import LogError
-from ..messages import Tick
+from ..messages import Closing, Tick
 from .format import tick_from_json
 from .hash_chain import ChainCheck
 from .header import LogHeader
@@ -27,8 +26,7 @@ from .recorder import HEADER_TOPIC, LINK_TOPIC, LOG_TOPIC, TICK_TOPIC
 
 LOG = logging.getLogger(__name__)
 
-LARGEST_RECORD = 64 << 20
-"""Longer records than this are damage, bytes."""
+LARGEST_RECORD = 64 << 20  # longer records than this are damage, bytes
 _DAMAGE = (McapError, CRCValidationError, ZstdError, struct.error, UnicodeDecodeError, MemoryError, OverflowError)
 _PART = re.compile(r"(?P<first>.+)\.part[1-9]\d*(?P<ending>\.[^.]*)")
 PARTS = "is in parts, as 0.8.0 wrote runs of more than 20 minutes; replay it with steerclear 0.8.0"
@@ -46,7 +44,7 @@ class LogLine:
     text: str
 
 
-class LogReader:
+class LogReader(Closing):
     """Reads a log once, from its beginning. A context manager.
 
     Args:
@@ -113,12 +111,6 @@ class LogReader:
     def close(self) -> None:
         """Give the file back."""
         self._file.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def _find_header(self) -> LogHeader:
         for topic, message in self._messages:

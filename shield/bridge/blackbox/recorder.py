@@ -29,11 +29,9 @@ TICK_TOPIC, HEADER_TOPIC, LOG_TOPIC, LINK_TOPIC = "/tick", "/header", "/log", "/
 SCENE_TOPIC, FIELD_TOPIC, FIX_TOPIC = "/scene", "/field", "/fix/"
 EVERY_S = {SCENE_TOPIC: 0.2, FIX_TOPIC: 1.0, FIELD_TOPIC: 10.0}
 LINK = schema_of(Link, "steerclear.Link")
-CHUNK_BYTES = 1 << 20
-"""A chunk is closed at every flush; this only bounds one."""
+CHUNK_BYTES = 1 << 20  # a chunk is closed at every flush; this only bounds one
 
-Line = tuple[int, str, str]
-"""A line of the log: its level, who it is about, its text."""
+Line = tuple[int, str, str]  # a line of the log: its level, who it is about, its text
 
 
 class McapFile(Store[Tick | Line]):

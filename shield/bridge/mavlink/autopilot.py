@@ -19,18 +19,15 @@ from .connection import AUTOPILOT, Endpoint
 from .fence import FenceReader
 from .telemetry import Streams, Telemetry
 
-HEARTBEAT_LOST_S = 3.5
-"""Without a heartbeat for so long the boat is not taken to obey."""
-FAILSAFE_S = 3.0
-"""A mode change within so long of the autopilot's word of a fail-safe, either way, is the fail-safe's."""
+HEARTBEAT_LOST_S = 3.5  # without a heartbeat for so long the boat is not taken to obey
+FAILSAFE_S = 3.0  # a mode change within so long of the autopilot's word of a fail-safe, either way, is the fail-safe's
 RECHECK_S = 5.0
 SAY_AGAIN_S, ANSWER_S = 10.0, 10.0
 """The same fault of the same sender is said again after the first; an answer to a command of ours comes within the
 second."""
 OFTEN_S, SELDOM_S, OFTEN = 0.2, 1.0, 10
 """TIMESYNC is asked every so often, until it was answered so often, then every so often, s."""
-EVERYBODY = 0
-"""Target of what all autopilots on a wire obey."""
+EVERYBODY = 0  # target of what all autopilots on a wire obey
 _MOST_STATIONS, _MOST_SAID, _OPEN = 64, 256, 16
 
 _FAILS = re.compile(r"failsafe|fail-safe|^crash:|battery \d+ is (low|critical)|fence breach", re.IGNORECASE)

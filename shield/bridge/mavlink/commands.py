@@ -23,8 +23,7 @@ from ..messages import never
 
 ATTITUDE_MASK, YAW_RATE_MASK, VELOCITY_MASK = 7, 3, 3527
 """The quaternion and the thrust count; the yaw rate counts instead; only the velocity counts."""
-CREEP_MPS = 1e-3
-"""A velocity of length zero has no direction: so slow a one keeps the heading."""
+CREEP_MPS = 1e-3  # a velocity of length zero has no direction: so slow a one keeps the heading
 OLDEST = (4, 0)
 TOP_SPEED = "WP_SPEED"
 
@@ -36,12 +35,9 @@ MODES = {
 GUIDED, HOLD = "GUIDED", "HOLD"
 
 ASK_AGAIN_S, LEARN_AGAIN_S = 0.7, 0.4
-_ROUND_S = 0.15
-"""Rounds of questions are at least this far apart, so that one gap in the radio does not cost all tries."""
-_TRIES = 3
-"""A parameter asked for so often and never answered is one this firmware lacks."""
-SAID_S = 15.0
-"""What an autopilot said so recently belongs to a refusal."""
+_ROUND_S = 0.15  # rounds of questions are at least this far apart, so that one gap in the radio does not cost all tries
+_TRIES = 3  # a parameter asked for so often and never answered is one this firmware lacks
+SAID_S = 15.0  # what an autopilot said so recently belongs to a refusal
 _PIECE, _MOST_PIECES = 50, 20
 
 
@@ -104,8 +100,7 @@ CAPABILITIES = {
     VelocityRoute.name: int(mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED),
 }
 """The capability that each route needs, as an autopilot says what it can."""
-ROUTES = tuple(CAPABILITIES)
-"""Names of the routes, best first."""
+ROUTES = tuple(CAPABILITIES)  # names of the routes, best first
 
 
 def _float32(value: float) -> float:
@@ -114,17 +109,11 @@ def _float32(value: float) -> float:
 
 @dataclass(frozen=True)
 class Abilities:
-    """What an autopilot said of itself.
+    """What an autopilot said of itself."""
 
-    Attributes:
-        version: major, minor, patch; None when it did not say.
-        capabilities: MAV_PROTOCOL_CAPABILITY bits; 0 when it did not say.
-        top_mps: WP_SPEED, m/s; None when it did not say.
-    """
-
-    version: tuple[int, int, int] | None = None
-    capabilities: int = 0
-    top_mps: float | None = None
+    version: tuple[int, int, int] | None = None  # major, minor, patch; None when it did not say
+    capabilities: int = 0  # MAV_PROTOCOL_CAPABILITY bits; 0 when it did not say
+    top_mps: float | None = None  # WP_SPEED, m/s; None when it did not say
 
 
 def check_route(route: str) -> str:

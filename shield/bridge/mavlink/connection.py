@@ -25,15 +25,12 @@ from .transport import Peer, Wire, make_wire, parse_address
 
 LOG = logging.getLogger(__name__)
 
-GROUND_SYSTEM = 255
-"""The system id ArduPilot's ground station failsafe listens to unless told otherwise."""
+GROUND_SYSTEM = 255  # the system id ArduPilot's ground station failsafe listens to unless told otherwise
 GROUND_COMPONENT = int(mavlink.MAV_COMP_ID_ONBOARD_COMPUTER)
 AUTOPILOT = int(mavlink.MAV_COMP_ID_AUTOPILOT1)
 HEARTBEAT_S = 1.0
-MOVES_AFTER_S = 3.0
-"""A boat may come from another address once its old one has been silent that long."""
-ECHO_S = 3.0
-"""An echo is back within this time; the same bytes later are old commands that somebody plays again."""
+MOVES_AFTER_S = 3.0  # a boat may come from another address once its old one has been silent that long
+ECHO_S = 3.0  # an echo is back within this time; the same bytes later are old commands that somebody plays again
 _POLL_S, _REOPEN_S, _BURST, _TOLD, _SENDERS, _MOST_KEPT = 0.05, 1.0, 256, 5, 64, 4096
 
 OnBytes = Callable[[str, bytes, int], None]

@@ -27,17 +27,11 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class FenceZone:
-    """One zone of a fence.
+    """One zone of a fence."""
 
-    Attributes:
-        inside: whether boats must stay inside of it, else outside.
-        places: latitude and longitude, deg, of its corners, or of its middle alone.
-        radius_m: of a circle; 0: it is a polygon.
-    """
-
-    inside: bool
-    places: tuple[Point, ...]
-    radius_m: float = 0.0
+    inside: bool  # whether boats must stay inside of it, else outside
+    places: tuple[Point, ...]  # latitude and longitude, deg, of its corners, or of its middle alone
+    radius_m: float = 0.0  # of a circle; 0: it is a polygon
 
 
 class FenceReader:

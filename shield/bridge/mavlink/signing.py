@@ -18,38 +18,29 @@ from pathlib import Path
 from ...exceptions import ConfigError
 
 KEY_BYTES = 32
-EPOCH_S = 1_420_070_400
-"""Signing time stamps count from 1 January 2015."""
-TICKS_PER_S = 100_000
-"""In units of 10 us."""
-NEW_STREAM_S = 60.0
-"""A stream heard for the first time may be this much behind our clock."""
+EPOCH_S = 1_420_070_400  # signing time stamps count from 1 January 2015
+TICKS_PER_S = 100_000  # in units of 10 us
+NEW_STREAM_S = 60.0  # a stream heard for the first time may be this much behind our clock
 
 _SIGNED_FLAG = 0x01
 _MARKER_2 = 0xFD
 _BLOCK = 13
 _SHORTEST_PASSPHRASE = 8
 _LONGEST = 4096
-_LIKE_DIGITS = 32
-"""So many hexadecimal digits and nothing else are meant as a key, not as a passphrase."""
-_NOT_DIGITS = re.compile(r"[\s:,;_\-'\"\0\ufeff]")
-"""What keys are written with between and round their digits."""
+_LIKE_DIGITS = 32  # so many hexadecimal digits and nothing else are meant as a key, not as a passphrase
+_NOT_DIGITS = re.compile(r"[\s:,;_\-'\"\0\ufeff]")  # what keys are written with between and round their digits
 
 
 @dataclass(frozen=True)
 class Signing:
     """A key and the number of this link.
 
-    Attributes:
-        key: 32 bytes; never shown.
-        link_id: 0 to 255.
-
     Raises:
         ConfigError: the key has another length, or the number is out of range.
     """
 
-    key: bytes = field(repr=False)
-    link_id: int = 1
+    key: bytes = field(repr=False)  # 32 bytes; never shown
+    link_id: int = 1  # 0 to 255
 
     def __post_init__(self) -> None:
         if len(self.key) != KEY_BYTES:
@@ -163,9 +154,7 @@ class SignatureCheck:
         wanted = hashlib.sha256(self._key + frame[:-6]).digest()[:6]
         if not hmac.compare_digest(wanted, frame[-6:]):
             return "bad_signature"
-        return self._refuse_time((frame[-_BLOCK], frame[5], frame[6]), int.from_bytes(frame[-12:-6], "little"))
-
-    def _refuse_time(self, stream: tuple[int, int, int], ticks: int) -> str:
+        stream, ticks = (frame[-_BLOCK], frame[5], frame[6]), int.from_bytes(frame[-12:-6], "little")
         latest = self._latest.get(stream)
         if latest is None:
             if ticks < self._clock.now() - round(NEW_STREAM_S * TICKS_PER_S):

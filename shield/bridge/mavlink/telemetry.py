@@ -12,16 +12,11 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from ..frame import TWO_PI, FieldFrame
 
-DRIFT = 1e-4
-"""The boat's clock may run this much faster or slower than ours, s per s."""
-AHEAD_S = 0.5
-"""A time since boot this much later than can be is doubted."""
-SYNCED_AHEAD_S = 0.1
-"""The same once a round trip says what can be."""
-BEHIND_S = 2.0
-"""So is one this much earlier than the latest: a restart, or a packet that was long under way."""
-BELIEVED_AFTER = 5
-"""So many doubted times in a row that agree are believed: the boat restarted, or its clock was set."""
+DRIFT = 1e-4  # the boat's clock may run this much faster or slower than ours, s per s
+AHEAD_S = 0.5  # a time since boot this much later than can be is doubted
+SYNCED_AHEAD_S = 0.1  # the same once a round trip says what can be
+BEHIND_S = 2.0  # so is one this much earlier than the latest: a restart, or a packet that was long under way
+BELIEVED_AFTER = 5  # so many doubted times in a row that agree are believed: the boat restarted, or its clock was set
 _SAME_CLOCK_S = 30.0
 
 
@@ -120,34 +115,28 @@ class BoatClock:
 FASTEST_MPS, FARTHEST_M, FASTEST_TURN_RADS = 30.0, 50_000.0, 10.0
 """Beyond these, the second from the field's corner, nothing is believed."""
 NO_HEADING = 36_000
-SETTLING_S = 1.0
-"""ATTITUDE is not believed so soon after boot."""
+SETTLING_S = 1.0  # ATTITUDE is not believed so soon after boot
 COURSE_MPS = 0.1
 _HEADING_LAG_S, _UNIX_2020_S = 0.2, 1_577_836_800
 
 ENOUGH_FIX = int(mavlink.GPS_FIX_TYPE_3D_FIX)
 FIX_SILENT_S = 3.0
 """A receiver that was heard and then said nothing for so long has lost its fix as far as anybody can tell."""
-GAP_S = 1.0
-"""A gap in the positions themselves is the link's: what is silent with them is counted from their return."""
-WORST_HDOP, WORST_ACCURACY_M = 5.0, 5.0
-"""Fixes as poor as this are of the right harbour, not of the right place."""
+GAP_S = 1.0  # a gap in the positions themselves is the link's: what is silent with them is counted from their return
+WORST_HDOP, WORST_ACCURACY_M = 5.0, 5.0  # fixes as poor as this are of the right harbour, not of the right place
 _HDOP_UNKNOWN = 65_535
 _RECEIVERS = {"GPS_RAW_INT": 1, "GPS2_RAW": 2}
 _ABSOLUTE = int(mavlink.EKF_POS_HORIZ_ABS)
 _NO_PLACE = int(mavlink.EKF_CONST_POS_MODE) | int(mavlink.EKF_UNINITIALIZED)
-_GLITCH = 1 << 15
-"""EKF_GPS_GLITCHING, which not every dialect knows."""
+_GLITCH = 1 << 15  # EKF_GPS_GLITCHING, which not every dialect knows
 
 POSITION = int(mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT)
 ATTITUDE = int(mavlink.MAVLINK_MSG_ID_ATTITUDE)
 WINDOW_S, WINDOW_MESSAGES = 1.0, 10
 """Rates are counted over the longer of a second and the time so many messages should take."""
-ENOUGH = 0.8
-"""Share of the rate asked for that must arrive."""
+ENOUGH = 0.8  # share of the rate asked for that must arrive
 _ASK_AGAIN_S, _EXTRA_TRIES, _KEPT = 2.0, 3, 256
-_GONE_S = 3.0
-"""An extra that came and then did not for so long is asked for again, however often it was."""
+_GONE_S = 3.0  # an extra that came and then did not for so long is asked for again, however often it was
 
 
 class _Word(NamedTuple):

@@ -17,8 +17,7 @@ from ...exceptions import LinkError
 KINDS = ("udpin", "udpout", "tcp", "tcpin", "serial")
 DEFAULT_BAUD = 57_600
 
-Peer = tuple[str, int]
-"""Who sent: host and port; on wires with one end, always the same."""
+Peer = tuple[str, int]  # who sent: host and port; on wires with one end, always the same
 
 _DATAGRAM, _CHUNK, _WAITING, _DIAL_S = 65_535, 8_192, 2_048, 5.0
 _REMEDIES = {
@@ -32,17 +31,11 @@ _REMEDIES = {
 
 @dataclass(frozen=True)
 class Address:
-    """Where a link is.
+    """Where a link is."""
 
-    Attributes:
-        kind: "udpin" (we listen), "udpout" (we send first), "tcp" (we dial), "tcpin" (we are dialled) or "serial".
-        host: name or number of the host, or the device.
-        number: port, or baud rate.
-    """
-
-    kind: str
-    host: str
-    number: int
+    kind: str  # "udpin" (we listen), "udpout" (we send first), "tcp" (we dial), "tcpin" (we are dialled) or "serial"
+    host: str  # name or number of the host, or the device
+    number: int  # port, or baud rate
 
     def __str__(self) -> str:
         return f"{self.kind}:{self.host}:{self.number}"

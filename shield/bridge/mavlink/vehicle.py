@@ -34,50 +34,31 @@ from .fence import FenceZone, Point
 LOG = logging.getLogger(__name__)
 
 STILL_MPS = 0.3
-STOP_S, HOLD_S = 12.0, 4.0
-"""A boat at 3 m/s that is left alone needs 5.6 s to stop."""
+STOP_S, HOLD_S = 12.0, 4.0  # a boat at 3 m/s that is left alone needs 5.6 s to stop
 _RESEND_S, _LEARN_S, _TRY_AGAIN_S, _FENCE_S = 0.1, 10.0, 2.0, 5.0
 
 
 @dataclass(frozen=True)
 class LinkHealth:
-    """State of one link at one moment.
+    """State of one link at one moment."""
 
-    Attributes:
-        rates_hz: arrivals of each message asked for, by name.
-        missing: needed messages that do not arrive at the rate asked for, in words; empty: all do.
-        round_trips_s: of the last TIMESYNC answers, s, newest last.
-        shortest_delay_s: what the quickest telemetry took, s; 0 while no round trip is known.
-        clock_starts: how often the boat's clock began anew.
-        wall_ahead_s: this machine's wall clock less the boat's GPS time, s; NaN: not heard.
-        fix_type: GPS_FIX_TYPE of the best receiver; -1: not heard.
-        version: of the firmware; None: not heard.
-        parameters: read so far.
-        signs: whether signing is on.
-        stations: other ground stations heard, as (system, component).
-        other_commander_s: when somebody else was last seen commanding the boat, s; -inf: never.
-        faults: of the whole wire since it was opened, by kind.
-        fix_fault: why its positions are not believed for want of a fix, in words; empty: they may be.
-        fence: zones of the autopilot's own fence; None: not heard, or not asked for because the fence is off.
-        home_deg: latitude and longitude of its home, deg; None: not heard.
-    """
-
-    rates_hz: Mapping[str, float]
-    missing: str
-    round_trips_s: tuple[float, ...]
-    shortest_delay_s: float
-    clock_starts: int
-    wall_ahead_s: float
-    fix_type: int
-    version: tuple[int, int, int] | None
-    parameters: Mapping[str, float]
-    signs: bool
-    stations: frozenset[tuple[int, int]]
-    other_commander_s: float
-    faults: Mapping[str, int]
-    fix_fault: str = ""
+    rates_hz: Mapping[str, float]  # arrivals of each message asked for, by name
+    missing: str  # needed messages that do not arrive at the rate asked for, in words; empty: all do
+    round_trips_s: tuple[float, ...]  # of the last TIMESYNC answers, s, newest last
+    shortest_delay_s: float  # what the quickest telemetry took, s; 0 while no round trip is known
+    clock_starts: int  # how often the boat's clock began anew
+    wall_ahead_s: float  # this machine's wall clock less the boat's GPS time, s; NaN: not heard
+    fix_type: int  # GPS_FIX_TYPE of the best receiver; -1: not heard
+    version: tuple[int, int, int] | None  # of the firmware; None: not heard
+    parameters: Mapping[str, float]  # read so far
+    signs: bool  # whether signing is on
+    stations: frozenset[tuple[int, int]]  # other ground stations heard, as (system, component)
+    other_commander_s: float  # when somebody else was last seen commanding the boat, s; -inf: never
+    faults: Mapping[str, int]  # of the whole wire since it was opened, by kind
+    fix_fault: str = ""  # why its positions are not believed for want of a fix, in words; empty: they may be
+    # zones of the autopilot's own fence; None: not heard, or not asked for because the fence is off
     fence: tuple[FenceZone, ...] | None = None
-    home_deg: Point | None = None
+    home_deg: Point | None = None  # latitude and longitude of its home, deg; None: not heard
 
 
 class MavlinkLink(Link):

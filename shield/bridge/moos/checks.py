@@ -21,14 +21,12 @@ from .client import Health
 from .nav import REFUSED, VARIABLES
 from .vehicle import MoosLink, client_name
 
-APART_M = 5.0
-"""NAV_X, NAV_Y and NAV_LAT, NAV_LONG agree within this."""
+APART_M = 5.0  # NAV_X, NAV_Y and NAV_LAT, NAV_LONG agree within this
 SHORTEST_S, LONGEST_S = 1.0, 2.0
 """Bounds of a PID's tardy thresholds: it must outlast two missed commands, and stop a boat whose gate died."""
 PIDS, SIMULATORS = ("pMarinePID", "pMarinePIDV22"), ("uSimMarine", "uSimMarineV22", "uSimMarineV23")
 LEAST_TICK = {**dict.fromkeys((*PIDS, *SIMULATORS), 5.0), "pHelmIvP": 2.0, "pNodeReporter": 2.0}
-GAIN_OFF = 0.2
-"""Share by which a PID's gains may differ from the platform's."""
+GAIN_OFF = 0.2  # share by which a PID's gains may differ from the platform's
 _BLOCK = re.compile(r"ProcessConfig\s*=\s*(\w+)\s*\{([^}]*)\}", re.IGNORECASE)
 _ENTRY = re.compile(r"^\s*([\w.]+)\s*=\s*(.*?)\s*(?://.*)?$")
 
@@ -144,7 +142,7 @@ def check_mission(watched: Watched) -> Found:
     except (OSError, ValueError) as error:
         return False, f"cannot read {settings.mission} ({error}); correct the link's mission", {}
     port, platform = int(settings.address.rpartition(":")[2]), watched.fleet.platform_of[link.boat]
-    faults = mission_faults(mission, port, link.client.warp, platform, settings.gate, settings.prefix)
+    faults = list(mission_faults(mission, port, link.client.warp, platform, settings.gate, settings.prefix))
     return not faults, "; ".join(faults) or "prefix, ticks, thresholds and gains fit", {}
 
 
@@ -191,11 +189,6 @@ def parse_mission(text: str) -> Mission:
     return {"": entries(_BLOCK.sub("", text)), **{name: entries(body) for name, body in _BLOCK.findall(text)}}
 
 
-def mission_faults(mission: Mission, port: int, warp: float, platform: Platform, gate: str, prefix: str) -> list[str]:
-    """Everything in a boat's mission that would undo the shield, each with its remedy; ``port``: of its MOOSDB."""
-    return list(_faults(mission, port, warp, platform, gate, prefix))
-
-
 def number(mission: Mission, app: str, key: str, otherwise: float) -> float:
     """A number of a mission; NaN where it is none, which fits nowhere."""
     try:
@@ -204,7 +197,10 @@ def number(mission: Mission, app: str, key: str, otherwise: float) -> float:
         return math.nan
 
 
-def _faults(mission: Mission, port: int, warp: float, platform: Platform, gate: str, prefix: str) -> Iterator[str]:
+def mission_faults(
+    mission: Mission, port: int, warp: float, platform: Platform, gate: str, prefix: str
+) -> Iterator[str]:
+    """Everything in a boat's mission that would undo the shield, each with its remedy; ``port``: of its MOOSDB."""
     top, helm, pids = mission.get("", {}), mission.get("pHelmIvP"), [name for name in PIDS if name in mission]
     if number(mission, "", "serverport", port) != port:
         yield f"ServerPort is {top['serverport']} and the link's port {port}: give both the same"

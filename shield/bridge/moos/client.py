@@ -41,30 +41,21 @@ DIAL_S, WELCOME_S = 2.0, 6.0
 """Patience for TCP, and for the welcome: another client that hangs while it connects holds up all for 5 s."""
 RETRY_S = 0.5
 LOOK_S = 0.05
-MOST_WAITING = 1 << 18
-"""Bytes that may wait to leave; then the MOOSDB does not read."""
-MOST_READS = 64
-"""Reads between two looks at the clock: a flood must not keep heartbeats back."""
+MOST_WAITING = 1 << 18  # bytes that may wait to leave; then the MOOSDB does not read
+MOST_READS = 64  # reads between two looks at the clock: a flood must not keep heartbeats back
 WARP_OFF = 1e-3
 """MOOS time is unix time times the warp; a share of difference beyond this is another warp, not a clock that is off."""
 
 
 @dataclass(frozen=True)
 class Health:
-    """What a client knows of its connection.
+    """What a client knows of its connection."""
 
-    Attributes:
-        fault: why the MOOSDB does not take our posts and answer heartbeats, in words; empty: it does.
-        community: the MOOSDB's.
-        echo_age_s, round_trip_s: since its last echo, and of the last heartbeat, real s.
-        sessions, damaged: connections so far, and those closed for damaged packets.
-    """
-
-    fault: str
-    community: str
-    echo_age_s: float
+    fault: str  # why the MOOSDB does not take our posts and answer heartbeats, in words; empty: it does
+    community: str  # the MOOSDB's
+    echo_age_s: float  # since its last echo, and of the last heartbeat, real s
     round_trip_s: float
-    sessions: int
+    sessions: int  # connections so far, and those closed for damaged packets
     damaged: int
 
 

@@ -13,10 +13,8 @@ from ..messages import Alarm, Contact
 
 LONGEST_CHARACTERS = 1 << 16
 MOST_CONTACTS = 256
-UNLISTED_S = 5.0
-"""A boat that is not in the fleet file is told of for so long after its last report, s."""
-_FIELD = re.compile(r"(?:[^,{]|\{[^}]*\}?)+")
-"""What stands between two commas; those within braces belong to a value."""
+UNLISTED_S = 5.0  # a boat that is not in the fleet file is told of for so long after its last report, s
+_FIELD = re.compile(r"(?:[^,{]|\{[^}]*\}?)+")  # what stands between two commas; those within braces belong to a value
 
 
 def parse_report(text: str) -> dict[str, str]:

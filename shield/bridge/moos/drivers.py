@@ -16,8 +16,7 @@ ALLSTOP, STATE = "IVPHELM_ALLSTOP", "IVPHELM_STATE"
 VARIABLES = (*OVERRIDES, ALLSTOP, STATE)
 HARMLESS_STOPS = ("clear", "nothingtodo", "manualoverride", "")
 """All-stops that do not concern commands of somebody else than the helm; the override is looked at by itself."""
-ECHO_S = 1.0
-"""Our own posts come back this soon, MOOS s; if not, the MOOSDB drops them."""
+ECHO_S = 1.0  # our own posts come back this soon, MOOS s; if not, the MOOSDB drops them
 
 
 class Drivers:

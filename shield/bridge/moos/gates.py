@@ -22,8 +22,7 @@ from ..frame import TWO_PI, FieldFrame
 from ..messages import BoatReading
 from .wire import DOUBLE, Message
 
-SILENCE_S = 1.0
-"""A nominal command older than this, MOOS s, is none: the boat is told to stop."""
+SILENCE_S = 1.0  # a nominal command older than this, MOOS s, is none: the boat is told to stop
 SUFFIX = "_PRECBF"
 SAME = 1e-9
 """A command this near to what the PID meant, rad and m/s, is the PID's: what is left is the rounding of angles."""
@@ -31,16 +30,11 @@ SAME = 1e-9
 
 @dataclass(frozen=True)
 class Nominal:
-    """What somebody else wants one boat to do.
+    """What somebody else wants one boat to do."""
 
-    Attributes:
-        speed_mps, heading_rad: the command, in the field's frame.
-        fault: why it is a stop of ours and not his command, in words; empty: it is his.
-    """
-
-    speed_mps: float
+    speed_mps: float  # the command, in the field's frame
     heading_rad: float
-    fault: str = ""
+    fault: str = ""  # why it is a stop of ours and not his command, in words; empty: it is his
 
 
 class Gate:

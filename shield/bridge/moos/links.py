@@ -18,8 +18,7 @@ from .contacts import MoosContacts
 from .gates import HelmGate, PidGate
 from .vehicle import MoosLink
 
-POLICY = "moos"
-"""Name of the policy whose commands come from the boats' own communities."""
+POLICY = "moos"  # name of the policy whose commands come from the boats' own communities
 
 
 class MoosLinks(LinkMaker):

@@ -12,15 +12,11 @@ from ..frame import TWO_PI, FieldFrame
 from .wire import DOUBLE, Message
 
 VARIABLES = ("NAV_X", "NAV_Y", "NAV_HEADING", "NAV_SPEED")
-PLACE = ("NAV_LAT", "NAV_LONG")
-"""Only compared with the others, before a start."""
+PLACE = ("NAV_LAT", "NAV_LONG")  # only compared with the others, before a start
 
-MATCHED_S = 0.05
-"""NAV_X and NAV_Y stamped no further apart than this, MOOS s, are of one moment."""
-EARLY_S = 0.5
-"""Stamps later than now by more than this, MOOS s, are of a clock that is wrong."""
-BACK_S = 2.0
-"""Stamps that go back by more than this are of a source that started anew."""
+MATCHED_S = 0.05  # NAV_X and NAV_Y stamped no further apart than this, MOOS s, are of one moment
+EARLY_S = 0.5  # stamps later than now by more than this, MOOS s, are of a clock that is wrong
+BACK_S = 2.0  # stamps that go back by more than this are of a source that started anew
 FARTHEST = {"NAV_SPEED": 30.0, "NAV_HEADING": 2.0 * 360.0, "NAV_X": 50_000.0, "NAV_Y": 50_000.0}
 """Values beyond are no boat's: m/s, deg, m."""
 REFUSED = {

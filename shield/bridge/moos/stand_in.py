@@ -19,6 +19,7 @@ from dataclasses import dataclass, field, replace
 
 from ...platforms import Platform
 from ...platforms import layout as L
+from ..messages import Closing
 from .drivers import OVERRIDES
 from .gates import SUFFIX, Autopilot, HelmGate, PidGate
 from .wire import (
@@ -62,7 +63,7 @@ class _Client:
             self.writer.transport.abort()  # it does not read
 
 
-class StandInDb:
+class StandInDb(Closing):
     """A MOOSDB of one community, on 127.0.0.1 (port 0: a free one), in a thread of its own. A context manager.
 
     Attributes:
@@ -109,12 +110,6 @@ class StandInDb:
         """End it; may be called again."""
         self._ends.set()
         self._thread.join()
-
-    def __enter__(self) -> StandInDb:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     async def _serve(self, socket_: socket.socket) -> None:
         self._loop = asyncio.get_running_loop()
@@ -193,28 +188,19 @@ class StandInDb:
                 client.send(message)
 
 
-TARDY_S = 2.0
-"""A PID that hears no command for longer, MOOS s, takes thrust off."""
-SKEW_S = 360.0
-"""Stamps further off than this are ignored."""
+TARDY_S = 2.0  # a PID that hears no command for longer, MOOS s, takes thrust off
+SKEW_S = 360.0  # stamps further off than this are ignored
 
 
 @dataclass
 class StandInPid:
-    """Hears what is written in its MOOSDB.
+    """Hears what is written in its MOOSDB."""
 
-    Attributes:
-        heading_deg, speed_mps: as last told, deg true and m/s.
-        heard_s: MOOS time of the last command, s.
-        overridden: whether a hand has the boat.
-        broken: whether it was told what is no number: it never recovers from that.
-    """
-
-    heading_deg: float = 0.0
+    heading_deg: float = 0.0  # as last told, deg true and m/s
     speed_mps: float = 0.0
-    heard_s: float = -math.inf
-    overridden: bool = False
-    broken: bool = False
+    heard_s: float = -math.inf  # MOOS time of the last command, s
+    overridden: bool = False  # whether a hand has the boat
+    broken: bool = False  # whether it was told what is no number: it never recovers from that
 
     def hear(self, message: Message, now_s: float) -> None:
         """A variable was written at MOOS time ``now_s``."""

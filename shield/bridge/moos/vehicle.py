@@ -25,10 +25,8 @@ from .wire import Message, WireError
 LOG = logging.getLogger(__name__)
 
 REPORT = "NODE_REPORT"
-ALIVE_S = 1.5
-"""A MOOSDB whose last echo is no older answers, real s."""
-REST_MPS, REST_S = 0.3, 3.0
-"""A boat this slow lies still; how long `close` waits for it, real s."""
+ALIVE_S = 1.5  # a MOOSDB whose last echo is no older answers, real s
+REST_MPS, REST_S = 0.3, 3.0  # a boat this slow lies still; how long `close` waits for it, real s
 POLL_S = 0.05
 HANGS_S = 1.0
 """Without a command of ours for so long, MOOS s, thrust is taken off actuators that would keep the last one."""

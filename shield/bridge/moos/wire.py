@@ -17,11 +17,9 @@ from ...exceptions import LinkError
 PROTOCOL = b"ELKS CAN'T DANCE 2/8/10".ljust(32, b"\0")
 """What a client sends before anything else, in one piece with its hello."""
 
-HEADER_BYTES, FIXED_BYTES = 9, 54
-"""Of a packet's header, and of a message without its five strings."""
+HEADER_BYTES, FIXED_BYTES = 9, 54  # of a packet's header, and of a message without its five strings
 
-MOST_BYTES = 1 << 22
-"""No packet may be longer: a MOOSDB itself would take any length it is told."""
+MOST_BYTES = 1 << 22  # no packet may be longer: a MOOSDB itself would take any length it is told
 
 DATA, WELCOME, POISON, NOTIFY, REGISTER, UNREGISTER = "i", "W", "K", "N", "R", "U"
 TIMING = "T"
@@ -40,29 +38,17 @@ class WireError(LinkError):
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """One MOOS message.
+    """One MOOS message."""
 
-    Attributes:
-        kind: one letter, such as `NOTIFY`.
-        key: name of the variable.
-        data: `DOUBLE`, `STRING` or `BINARY`.
-        source: name of the client that posted it; a MOOSDB acts for the client named here.
-        time_s: when the value was valid, s of MOOS time.
-        value: of a double; -1 otherwise.
-        text: of a string.
-        value2: mostly -1.
-        source_aux, community, number: further source, origin and id.
-    """
-
-    kind: str
-    key: str = ""
-    data: str = DOUBLE
-    source: str = ""
-    time_s: float = -1.0
-    value: float = -1.0
-    text: str = ""
-    value2: float = -1.0
-    source_aux: str = ""
+    kind: str  # one letter, such as `NOTIFY`
+    key: str = ""  # name of the variable
+    data: str = DOUBLE  # `DOUBLE`, `STRING` or `BINARY`
+    source: str = ""  # name of the client that posted it; a MOOSDB acts for the client named here
+    time_s: float = -1.0  # when the value was valid, s of MOOS time
+    value: float = -1.0  # of a double; -1 otherwise
+    text: str = ""  # of a string
+    value2: float = -1.0  # mostly -1
+    source_aux: str = ""  # further source, origin and id
     community: str = ""
     number: int = -1
 

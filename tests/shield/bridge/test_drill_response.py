@@ -206,10 +206,6 @@ def test_a_boat_that_gave_way_to_another_is_not_taken_to_steer_the_wrong_way_rou
     assert "% of its commands changed by the shield" in result.text
 
 
-def test_a_link_that_caps_the_speed_is_no_disturbance(samples):
-    assert not any(replace(s, speed_mps=min(s.speed_mps, 1.0)).changed for s in samples)
-
-
 def test_a_compass_that_is_off_is_found():
     result = check_course("blue_1", driven(compass_deg=25.0)[0].samples["blue_1"])
     assert not result.passed

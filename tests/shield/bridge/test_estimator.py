@@ -6,16 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bridge_fakes import World, fleet_of, straight
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from steerclear.shield.bridge.estimator import GONE_M, LEFT_M, MOST_UNSEEN_M, Estimator
 from steerclear.shield.bridge.fleet_settings import Limits, ModelLimit
 from steerclear.shield.bridge.messages import BoatReading, Sent
 from steerclear.shield.bridge.model_error import WIDEN_MPS, ModelErrorMonitor
-from steerclear.shield.config import ShieldConfig
 from steerclear.shield.platforms import fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L
-from steerclear.shield.tracks import steps_of_delay
 
 DT_S, NAME = 0.1, "blue_1"
 
@@ -45,33 +41,6 @@ def sail(platform, commands, delay_steps=0, noise=None):
             error = (command[1] - row[L.HEADING] + 180.0) % 360.0 - 180.0
             step_boat(params, row, command[0], error, DT_S)
     return pairs
-
-
-COMMANDS = st.lists(st.tuples(st.floats(0.0, 2.0), st.integers(-180, 180)), min_size=2, max_size=5)
-
-
-@settings(deadline=None, max_examples=15, derandomize=True)
-@given(COMMANDS, st.integers(0, 3), st.sampled_from(["heron", "surveyor"]))
-def test_a_boat_that_obeys_its_model_is_the_simulators_bit_for_bit(commands, delay, platform):
-    held = [command for command in commands for _ in range(12)]
-    for truth, believed in sail(platform, held, delay):
-        if delay and not truth[L.SPEED]:
-            continue  # before its first command works
-        np.testing.assert_array_equal(believed, truth)
-
-
-@pytest.mark.parametrize(("delay_s", "steps"), [(0.04, 1), (0.1, 1), (0.14, 2), (0.3, 3), (0.31, 4)])
-def test_a_delay_between_steps_is_counted_up_as_the_shield_counts_it(delay_s, steps):
-    """Else the boat would have carried out a command that the shield has on its way yet, and carries out again."""
-    assert steps == steps_of_delay(ShieldConfig(delay_s=delay_s, dt_s=DT_S))
-    estimator = Estimator(get_platform("heron"), DT_S, delay_s)
-    estimator.correct(reading(fresh_state(0.0, 0.0, 0.0, 1.0), 50.0))
-    turned = []
-    for k in range(6):
-        estimator.sent(50.0 + k * DT_S, math.radians(90.0), 2.0)
-        estimator.advance(50.0 + (k + 1) * DT_S)
-        turned.append(estimator.estimate(50.0 + (k + 1) * DT_S).row[L.HEADING] != 0.0)
-    assert turned == [k >= steps for k in range(6)]
 
 
 def test_noise_is_smoothed_and_memory_stays_the_boats():

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from bridge_fakes import fleet_of
 from steerclear.shield import Commands
-from steerclear.shield.bridge.failsafe import Failsafe, Seen, words
+from steerclear.shield.bridge.failsafe import Failsafe, Seen
 from steerclear.shield.bridge.failsafe_table import CONDITIONS, DISABLES, response_page, response_table
 from steerclear.shield.bridge.messages import Answer, BoatReading
 from steerclear.shield.bridge.operator import LONGEST_OVERRIDE_S, Operator, Override
@@ -205,23 +205,6 @@ def test_the_table_names_only_settings_that_there_are_and_only_what_can_be_overr
 def test_the_page_shows_the_table_that_the_loop_acts_by():
     page = (Path(__file__).parents[3] / "docs" / "boat_reference.md").read_text()
     assert f"<!-- responses -->\n{response_page()}\n<!-- /responses -->" in page
-
-
-def test_ages_in_words():
-    assert [words(age) for age in (0.25, 120.4, math.inf)] == ["0.2 s old", "120 s old", "never heard"]
-
-
-def test_stop_all_is_in_force_until_taken_back(caplog):
-    operator = Operator()
-    with caplog.at_level(logging.WARNING):
-        operator.stop_all("key")
-        assert (operator.stopped, operator.hard) == ("key", False)
-        operator.stop_all("key")
-        assert operator.hard
-        assert [action.condition for action in operator.actions(0.0)] == ["stop_all"]
-        operator.resume()
-    assert (operator.stopped, operator.hard, operator.actions(0.0)) == ("", False, ())
-    assert "past the shield" in caplog.text
 
 
 def test_an_override_says_what_it_disables_and_ends(caplog):

@@ -161,6 +161,7 @@ BAD_FIXES = [
     {"error_m": None},
     {"boat": 7},
     {"boat": ""},
+    {"boat": "blue_1"},  # given twice
 ]
 
 
@@ -174,6 +175,8 @@ def test_a_bad_fix_does_not_cost_the_others_theirs(receiver, fault):
     receiver.take(data, LOCAL)
     assert [found.boat for found in receiver.read()] == ["blue_1"]
     assert receiver.faults()["fix"] == 1
+    receiver.take(positions(5, contact(), seq=2), LOCAL)  # no object at all
+    assert receiver.faults()["fix"] == 2
 
 
 @pytest.mark.parametrize("heading", [360.0, 720.0, -1e-17, -360.0, 0.0])
@@ -332,6 +335,16 @@ def test_a_new_start_counts_after_the_old_ones_silence_and_so_does_the_old_one_a
     assert problem(order, 1.0 + 2.0 * GONE_S, 22, run=7) is None, "it held its place while it spoke, no longer"
 
 
+def test_a_second_hub_on_the_same_file_is_said_and_the_first_goes_on(receiver):
+    for seq, run, speed in ((0, 1, 1.0), (0, 2, 2.0), (1, 1, 1.5)):
+        assert receiver.alarms() == () or seq
+        receiver.take(positions(contact(speed_mps=speed), seq=seq, run=run), LOCAL)
+    assert receiver.faults() == {"second run": 1}
+    assert [found.speed_mps for found in receiver.read()] == [1.5, 2.0], "the other may be the right one"
+    (alarm,) = receiver.alarms()
+    assert "two programs send as hub; end one of them" in alarm.text
+
+
 def test_small_disorder_is_old_and_no_sign_of_a_second_program(order):
     told(order, 1.0)
     assert problem(order, 1.0, 20)[0] == "repeated"
@@ -471,27 +484,6 @@ def flood(receiver, data, goes_on):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
         while goes_on():
             out.sendto(data, (host, int(port)))
-
-
-def test_a_second_hub_on_the_same_file_is_said_and_the_first_goes_on():
-    def fix(speed):
-        return [Fix("red_1", 42.0, -71.0, 75.0, speed, 0.0, 0.5)]
-
-    with (
-        hearing() as receiver,
-        FeedSender("gps_hub", [receiver.address]) as first,
-        FeedSender("gps_hub", [receiver.address]) as second,
-    ):
-        first.send_positions(fix(1.0))
-        wait_for(receiver.read)
-        assert receiver.alarms() == ()
-        for _ in range(10):
-            second.send_positions(fix(2.0))
-            first.send_positions(fix(1.0))
-        wait_for(lambda: receiver.faults().get("second run") == 10)
-        assert [found.speed_mps for found in receiver.read()] == [1.0, 2.0], "the other may be the right one"
-        (alarm,) = receiver.alarms()
-        assert "two programs send as gps_hub; end one of them" in alarm.text
 
 
 def test_what_cannot_be_sent_and_addresses_that_are_none_are_one_clear_error(receiver):

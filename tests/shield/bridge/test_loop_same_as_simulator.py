@@ -80,9 +80,10 @@ def _delay(link, steps):
     link.advance = late
 
 
-@pytest.mark.parametrize("late_steps", [0, 2])
-def test_the_same_states_give_the_same_commands_bit_for_bit(late_steps):
-    fleet = fleet_of(blue=3, red=3, more=f"shield: {{delay_s: {0.1 * late_steps}, track_error_mps: 0.0}}")
+@pytest.mark.parametrize(("delay_s", "late_steps"), [(0.0, 0), (0.04, 1), (0.2, 2), (0.31, 4)])
+def test_the_same_states_give_the_same_commands_bit_for_bit(delay_s, late_steps):
+    """A delay between steps is counted up: else a boat would have carried out a command that the shield has yet to."""
+    fleet = fleet_of(blue=3, red=3, more=f"shield: {{delay_s: {delay_s}, track_error_mps: 0.0}}")
     expected, changed = simulate(fleet, late_steps)
     world = run_loop(fleet, late_steps)
     decided = [

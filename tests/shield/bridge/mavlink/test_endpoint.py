@@ -141,16 +141,6 @@ def test_with_signing_unsigned_and_wrongly_signed_boats_are_refused():
     made.close()
 
 
-def test_noise_is_counted_and_changes_nothing(endpoint):
-    ear = attached(endpoint)
-    with FakeBoat(endpoint.port) as boat:
-        assert wait_for(lambda: ear.messages)
-        for noise in (b"\xfd" * 100, b"\x00" * 500, b"\xfe\xff" * 40, b""):
-            boat.socket.sendto(noise, ("127.0.0.1", endpoint.port))
-        seen = len(ear.messages)
-        assert wait_for(lambda: "bad_checksum" in ear.refused and len(ear.messages) > seen)
-
-
 def test_the_wire_is_given_back_with_the_last_boat_and_can_be_attached_again(endpoint):
     port = endpoint.port
     attached(endpoint, 2)

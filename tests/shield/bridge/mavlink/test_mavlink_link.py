@@ -91,6 +91,7 @@ def test_a_boat_that_cannot_be_connected_to_is_refused_with_the_reason(boat, sec
         fake.mav.srcSystem = own_id
         with pytest.raises(LinkError, match=words):
             link.connect(seconds)
+        assert link.read().why_not
 
 
 @pytest.mark.parametrize(

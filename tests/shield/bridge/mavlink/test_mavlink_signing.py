@@ -6,7 +6,6 @@ import time
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
-from steerclear.shield.bridge.mavlink.connection import Codec
 from steerclear.shield.bridge.mavlink.signing import SignatureCheck, Signing, SigningClock, read_key
 from steerclear.shield.exceptions import ConfigError
 
@@ -128,15 +127,3 @@ def test_our_time_stamps_rise_when_the_wall_clock_steps_back_and_never_fall_behi
     ahead = clock.now() + 99 * MINUTE
     assert SignatureCheck(KEY, clock).refuse(signed(at=100 * MINUTE)) == ""
     assert clock.take() > ahead
-
-
-def test_two_codecs_with_one_key_understand_each_other_and_nobody_else():
-    ours, theirs, plain = Codec(255, 191, Signing(KEY)), Codec(1, 1, Signing(KEY)), Codec(1, 1, None)
-    message, refused = ours.decode(theirs.encode(BEAT))
-    assert (refused, message.custom_mode) == ("", 15)
-    assert ours.decode(plain.encode(BEAT)) == (None, "unsigned")
-    assert ours.decode(Codec(1, 1, Signing(KEY[::-1])).encode(BEAT)) == (None, "bad_signature")
-    frame = ours.encode(BEAT)
-    assert theirs.decode(frame)[1] == ""
-    assert theirs.decode(frame)[1] == "replayed"
-    assert plain.decode(frame)[1] == "", "who has no key cannot check"

@@ -17,7 +17,7 @@ from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.moos import client as client_module
 from steerclear.shield.bridge.moos.client import MoosClient
 from steerclear.shield.bridge.moos.stand_in import StandInDb
-from steerclear.shield.bridge.moos.wire import PROTOCOL, Message, WireError, pack_packet, timing
+from steerclear.shield.bridge.moos.wire import PROTOCOL, Message, pack_packet, timing
 
 logging.getLogger("steerclear").setLevel(logging.ERROR)
 
@@ -132,16 +132,6 @@ def test_a_real_frozen_moosdb_is_given_up_for_its_silence_and_found_again():
         assert until(lambda: not client.connected, 5.0)
         os.kill(process.pid, signal.SIGCONT)
         assert until(lambda: client.connected, 15.0)
-
-
-def test_a_number_that_is_none_never_leaves():
-    with StandInDb("alpha") as db, client_of(db.port) as (client, _):
-        assert until(lambda: client.connected)
-        with pytest.raises(WireError):
-            client.post({"A": 1.0, "B": float("nan")})
-        assert client.post({"B": 2.0})
-        assert until(lambda: "B" in db.latest)
-        assert "A" not in db.latest
 
 
 def test_a_moosdb_that_does_not_read_costs_no_memory_and_no_time(monkeypatch):

@@ -157,7 +157,7 @@ ProcessConfig = pMarinePIDV22
 
 
 def faults(text, port=9001, warp=1.0, gate="helm"):
-    return mission_faults(parse_mission(text), port, warp, get_platform("heron"), gate, "RAW_")
+    return list(mission_faults(parse_mission(text), port, warp, get_platform("heron"), gate, "RAW_"))
 
 
 def test_a_mission_that_fits_has_no_faults():

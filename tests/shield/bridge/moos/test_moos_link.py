@@ -79,29 +79,6 @@ def test_a_hand_on_the_boat_is_seen_at_once_and_only_that_hand_lets_go(world, co
     assert not link.read().released
 
 
-def test_another_writer_of_our_variables_is_named_and_counted(world, community):
-    _, link, _ = world
-    community.post("DESIRED_HEADING", 270.0, "pBehave")
-    found, faults = "", {}
-    for _ in range(50):
-        reading = link.read()
-        found, faults = found + " ".join(reading.texts), faults | reading.faults
-        if faults:
-            break
-        time.sleep(0.02)
-    assert "pBehave" in found
-    assert faults == {"second_commander": 1}
-
-
-def test_numbers_that_are_none_are_refused_and_told(world, community):
-    _, link, _ = world
-    before = link.read().position_m
-    community.db.post("NAV_X", math.nan, "uSimMarine")
-    assert "restart the simulator" in texts_of(link)
-    assert all(map(math.isfinite, link.read().position_m))
-    assert math.dist(before, link.read().position_m) < 3.0
-
-
 def test_nominal_commands_come_through_and_silence_of_a_second_is_a_stop(world, community):
     _, link, _ = world
     nominal = MoosNominal(FLEET, ("blue_1",))
@@ -163,19 +140,6 @@ def test_a_frozen_moosdb_shows_as_age_and_the_boat_stops_by_itself(world, commun
     assert until(lambda: not boats.boats["blue_1"].is_commanded, 3.0)
     community.db.frozen.clear()
     assert until(lambda: link.read().ready and link.read().age_s < 0.5, 15.0)
-
-
-def test_at_a_warp_stamps_and_ages_are_those_of_the_boats_time():
-    fleet, warp = fleet_of(1, 1), 4.0
-    with sim_of(fleet, warp) as boats, link_of(fleet, warp) as (link, maker):
-        for _ in range(50):
-            link.send(1.0, 1.5)
-            time.sleep(0.02)
-        assert boats.boats["blue_1"].is_commanded
-        assert link.read().age_s < 0.1 * warp + 0.4
-        stamp_s = boats.boats["blue_1"].community.db.latest["DESIRED_SPEED"].time_s
-        assert abs(stamp_s / (time.time() * warp) - 1.0) < 1e-6
-        assert maker.sources()[0].read()[0].boat == "red_1"
 
 
 def test_a_boat_nobody_simulates_is_told_with_its_address():
