@@ -149,11 +149,11 @@ class Encounter:
         return Commands.absolute_rad(np.stack([np.full(4, 2.0), course], axis=1))
 
 
-def write_log(path, steps=300, header=None, kind=Encounter, **more):
-    """Write the log of an encounter; returns its header and ticks."""
+def write_log(path, steps=300, header=None, kind=Encounter, box=None, **more):
+    """Write the log of an encounter, ``box``: settings of its writer; returns its header and ticks."""
     header = header or header_of()
     ticks = list(kind(header, steps, **more))
-    writer = McapWriter(path, header, capacity=steps + 10)
+    writer = McapWriter(path, header, capacity=steps + 10, **(box or {}))
     for tick in ticks:
         writer.take(tick)
     writer.close()

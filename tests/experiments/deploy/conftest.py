@@ -15,7 +15,7 @@ from steerclear.shield.platforms import layout as L
 SEEN = [L.X, L.Y, L.HEADING, L.SPEED]
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def fleet_of():
     """Builds a fleet file of two teams of that size; a boat outside the game stands in the middle of the list."""
 

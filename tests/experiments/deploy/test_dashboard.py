@@ -5,36 +5,58 @@ import io
 import logging
 import math
 import os
+import termios
 import threading
 import time
 from pathlib import Path
 
 import numpy as np
 import pytest
-from made_ticks import Stream, made_tick, wait_for
+from logged_runs import Encounter, header_of
 from rich.console import Console
+from steerclear.env.core import BatchedMctf
 from steerclear.experiments.deploy import dashboard as dashboard_module
-from steerclear.experiments.deploy.dashboard import Dashboard
+from steerclear.experiments.deploy.dashboard import Controls, Dashboard, Keyboard
 from steerclear.experiments.deploy.dashboard_map import FieldMap
-from steerclear.experiments.deploy.dashboard_view import WHY, Moment, View, approaches, boats_table, dashboard_page
+from steerclear.experiments.deploy.dashboard_view import WHY, Moment, View, approaches, dashboard_page
+from steerclear.experiments.deploy.referee import game_config, player_names, state_of
 from steerclear.experiments.sim_boats.demo import demo_fleet
 from steerclear.experiments.terminal import SafeConsole
+from steerclear.shield import Commands
 from steerclear.shield.bridge.clock import ManualClock
+from steerclear.shield.bridge.failsafe_table import DISABLES
 from steerclear.shield.bridge.messages import Action, BoatReading, Tick
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.decision import Reason
 from steerclear.shield.exceptions import BridgeError
 from steerclear.shield.fleet import Fleet
 from steerclear.shield.surroundings import Surroundings
+from waiting import wait_for
+
+
+class Stream:
+    """An encounter of two against two under way, as the loop would show it."""
+
+    def __init__(self, fleet):
+        self.fleet, self.names = fleet, player_names(fleet)
+        self.box = Surroundings(field=fleet.geofence.box)
+        core = BatchedMctf(game_config(fleet))
+        self.game = state_of(core, self.names).as_dict()
+        self.ticks = iter(Encounter(header_of(), 400))
+        while not next(self.ticks).decisions.intervened[0]:
+            pass  # until the shield changes a command
+
+    def tick(self, now_s):
+        """The next turn, begun then."""
+        tick = next(self.ticks)
+        times = {"due_s": now_s, "began_s": now_s + 0.0003, "sent_s": now_s + 0.004, "policy_age_s": 0.06}
+        contacts = tuple(dataclasses.replace(one, fixed_s=now_s - 0.12) for one in tick.contacts)
+        return dataclasses.replace(tick, **times, contacts=contacts, surroundings=self.box, game=self.game, actions=())
 
 
 @pytest.fixture(scope="module")
-def stream():
-    """A game of three against three under way, rammers about."""
-    played = Stream(demo_fleet())
-    for _ in range(80):
-        played.tick()
-    return played
+def stream(fleet_of):
+    return Stream(fleet_of(2))
 
 
 def console_of(width, height=40, kind=Console):
@@ -52,7 +74,7 @@ def row_of(lines, name):
     return next(line for line in lines if line.startswith(name))
 
 
-@pytest.mark.parametrize(("columns", "rows"), [(80, 24), (100, 40), (170, 45), (40, 10), (10, 3)])
+@pytest.mark.parametrize(("columns", "rows"), [(80, 24), (170, 45), (40, 10), (10, 3), (1, 1)])
 def test_the_screen_is_as_large_as_the_terminal_and_has_every_boat_twice(stream, columns, rows):
     console, view = console_of(columns, rows), View(stream.fleet)
     for moment in (Moment(None, 0.0), Moment(stream.tick(5.0), 5.1, log=["a", "b"])):
@@ -86,8 +108,8 @@ def test_a_row_says_wanted_sent_why_and_the_closest_approach(stream):
     for words in (f"{decision.nominal_speed_mps:.1f} {heading:03d}°", f"{decision.filtered_speed_mps:.1f} "):
         assert words in line
     assert f"{near.other} {near.closest_m:.1f} m" in line
-    other = row_of(shown(stream.fleet, Moment(tick, 9.0)), "red_1")
-    assert "by hub, error 0.3 m" in other
+    other = row_of(shown(stream.fleet, Moment(tick, 9.0), columns=120), "red_1")
+    assert "by gps_hub, error 0.3 m" in other
     assert "4.12" in other, "the age grows with the clock, not with the ticks"
 
 
@@ -141,19 +163,13 @@ def test_the_operators_page_tells_every_line():
 
 
 def test_closest_approaches_of_crossing_and_parting_boats():
-    places, headings = [(0.0, 0.0), (10.0, 0.0), (0.0, -20.0)], [0.0, -0.5 * math.pi, math.pi]
-
-    def found(k, teams):
-        return approaches(
-            Fleet.of(
-                position_m=places[:k], heading_rad=headings[:k], speed_mps=[1.0] * k, team=teams, platforms="heron"
-            )
-        )
-
-    (near,) = found(3, [0, 1, 1]).values()
+    three = Fleet.of(
+        position_m=[(0.0, 0.0), (10.0, 0.0), (0.0, -20.0)], heading_rad=[0.0, -0.5 * math.pi, math.pi],
+        speed_mps=[1.0] * 3, team=[0, 1, 1], platforms="heron",
+    )  # fmt: skip
+    (near,) = approaches(three).values()
     assert (near.boat, near.other) == ("boat_0", "boat_1")
     assert (near.distance_m, near.in_s, near.closest_m) == pytest.approx((10.0, 5.0, math.sqrt(50.0)))
-    assert found(1, [0]) == {}
 
 
 def cell_of(lines, name, title):
@@ -164,32 +180,35 @@ def cell_of(lines, name, title):
     return row[end - 9 : end].strip()
 
 
-@pytest.mark.parametrize(("columns", "rows"), [(60, 24), (80, 24), (120, 40), (160, 45), (200, 30)])
-def test_what_was_wanted_and_sent_is_shown_whole(columns, rows):
-    lines = shown(demo_fleet(), Moment(made_tick(demo_fleet()), 5.0), columns, rows)
-    cells = [[cell_of(lines, f"blue_{k}", title) for k in (1, 2, 3)] for title in ("nominal", "filtered")]
-    assert cells == [["1.5 054°", "12.5 359°", "2.0 180°"], ["1.5 054°", "10.2 008°", "0.0 271°"]]
-
-
-@pytest.mark.parametrize("width", [1, 10, 30, 45, 60, 80, 99, 160, 400])
-def test_the_table_is_as_wide_as_it_may_be(width):
-    console = Console(file=io.StringIO(), width=width, color_system=None)
-    cells = {"boat": "b" * 32, "nominal": "12.5 359°", "filtered": "-2.5 007°", "closest": "c" * 90, "why": "best eff."}
-    console.print(boats_table(width, [cells]))
-    lines = console.file.getvalue().splitlines()
-    assert all(len(line) <= width for line in lines)
-    assert width < 30 or ("12.5 359°" in lines[1] and "-2.5 007°" in lines[1])
-
-
-def test_names_from_outside_are_shown_and_not_obeyed():
-    hostile, plain = ["\x1b[2Jblue", "[bold]b[/]", "\u202eeulb", "red\x07", "[/red]", "r\nd"], demo_fleet()
-    boats = [boat.model_copy(update={"name": name}) for boat, name in zip(plain.boats, hostile, strict=True)]
-    fleet, view = plain.model_copy(update={"boats": boats}), View(plain)
-    view._fleet = fleet  # files with such names are refused; the view does not rely on that
-    console = console_of(160, 45, SafeConsole)
-    console.print(
-        view.of(Moment(made_tick(fleet, names=hostile), 5.0, log=["\x1b]0;title\x07 said"]), 160, 45), height=45
+@pytest.mark.parametrize(("columns", "rows"), [(60, 24), (80, 24), (200, 30)])
+def test_what_was_wanted_and_sent_is_shown_whole(stream, columns, rows):
+    tick = stream.tick(5.0)
+    wanted, sent = (
+        Commands.absolute_rad([(speed, math.radians(deg)) for speed, deg in (*own, (0.0, 0.0), (0.0, 0.0))])
+        for own in (((1.5, 54.0), (12.5, 359.0)), ((1.5, 54.0), (10.25, 8.0)))
     )
+    rows_of = zip(tick.sent.items(), sent.values.tolist(), strict=False)
+    told = {name: dataclasses.replace(one, speed_mps=row[0], heading_rad=row[1]) for (name, one), row in rows_of}
+    decisions = dataclasses.replace(tick.decisions, nominal=wanted, filtered=sent)
+    lines = shown(stream.fleet, Moment(dataclasses.replace(tick, decisions=decisions, sent=told), 5.0), columns, rows)
+    cells = [[cell_of(lines, f"blue_{k}", title) for k in (1, 2)] for title in ("nominal", "filtered")]
+    assert cells == [["1.5 054°", "12.5 359°"], ["1.5 054°", "10.2 008°"]]
+
+
+def test_names_from_outside_are_shown_and_not_obeyed(stream):
+    hostile, tick = ["\x1b[2Jblue", "[bold]b[/]", "\u202eeulb", "red\x07", "[/red]"], stream.tick(5.0)
+    boats = [boat.model_copy(update={"name": name}) for boat, name in zip(stream.fleet.boats, hostile, strict=True)]
+    own, others = zip(hostile, tick.readings.values(), strict=False), zip(hostile[3:], tick.contacts, strict=True)
+    view = View(stream.fleet)
+    view._fleet = stream.fleet.model_copy(update={"boats": boats})  # files with such names are refused before
+    parts = {
+        "fleet": dataclasses.replace(tick.fleet, names=(*hostile[:2], *hostile[3:])),
+        "readings": {name: dataclasses.replace(reading, boat=name) for name, reading in own},
+        "contacts": tuple(dataclasses.replace(contact, boat=name) for name, contact in others),
+    }
+    console = console_of(160, 45, SafeConsole)
+    moment = Moment(dataclasses.replace(tick, **parts), 5.0, log=["\x1b]0;title\x07 said"])
+    console.print(view.of(moment, 160, 45), height=45)
     drawn = console.file.getvalue()
     assert not {"\x1b", "\x07", "\u202e"} & set(drawn)
     assert all(name in drawn for name in ("[bold]b[/]", "[/red]"))
@@ -267,3 +286,118 @@ def test_taking_a_tick_is_quick_and_waits_for_nothing(dash, stream, monkeypatch)
     assert np.median(spent) < 1e-4
     assert isinstance(built.moment().tick, Tick)
     assert built.moment().late_s == pytest.approx((3e-4, 3e-4))
+
+
+@pytest.fixture
+def controls():
+    """Keys' meaning with an operator and a clock that both can be looked at."""
+    operator = Operator()
+    made = Controls(demo_fleet(), operator, ManualClock(7.0))
+
+    def press(keys):
+        for key in keys:
+            made.press(key)
+
+    return made, operator, press
+
+
+STOPPED, HARD, FREE = ("keyboard", False, ""), ("keyboard", True, ""), ("", False, "")
+PRESSED = {
+    **{before + key: STOPPED for before in ("", "o", "o1", "o12", "x\x1b\n") for key in " sS"},
+    **dict.fromkeys((" " * 50, "  ", "ss", " S", "s sS  "), STOPPED),  # no number of presses goes past the shield
+    "  y": HARD,
+    "  y ": HARD,  # the stop key takes nothing back
+    **dict.fromkeys(("  ny", "  \x1by", "  ry", "  qy"), STOPPED),  # any other answer stays behind the shield
+    " r": STOPPED,
+    " rn": STOPPED,
+    " ry": FREE,
+    " ry ": STOPPED,
+    **dict.fromkeys(("o\x1b", "o9", "o1z", "o11x", "zZ0\t", "r", "y", "t\x1b"), FREE),
+    "q": ("", False, "keyboard"),
+}
+"""Keys, and what boats and run are told then: stopped by, past the shield, run ended by."""
+
+
+@pytest.mark.parametrize("keys", PRESSED)
+def test_keys_mean_what_they_say(controls, keys):
+    made, operator, press = controls
+    press(keys)
+    assert (operator.stopped, operator.hard, operator.ended) == PRESSED[keys]
+    assert operator.active(7.0) == ()
+    asks = {"hard": "past the shield", "resume": "Take STOP ALL back?"}.get(made._open, "")
+    assert bool(made.menu()) == bool(asks)
+    assert asks in "".join(made.menu())
+
+
+def test_a_boat_is_taken_back_by_key_after_a_question(controls, caplog):
+    made, operator, press = controls
+    press("t")
+    assert "Its pilot must have let go" in made.menu()[0]
+    assert "red" not in made.menu()[1], "ours alone"
+    press("2")
+    assert "y: yes" in made.menu()[0]
+    press("n")
+    assert operator.take_requests() == ()
+    press("t2y")
+    ((boat, by),) = operator.take_requests()
+    assert (boat.startswith("blue"), by) == (True, "keyboard")
+    assert operator.take_requests() == ()
+    assert f"{boat}: to be taken back, asked for by keyboard" in caplog.text
+
+
+def test_an_override_says_what_it_disables_and_for_how_long(controls):
+    made, operator, press = controls
+    press("o")
+    assert all(f"{name}: disables {disabled}" in "\n".join(made.menu()) for name, disabled in DISABLES.items())
+    press(str(1 + list(DISABLES).index("contact")))
+    assert "2 blue_1" in made.menu()[1]
+    press("5")
+    assert DISABLES["contact"] in made.menu()[0]
+    press("2")
+    assert made.menu() == []
+    (entry,) = operator.active(7.0)
+    assert (entry.condition, entry.subject, entry.until_s, entry.by) == ("contact", "red_1", 37.0, "keyboard")
+
+
+def test_keys_come_one_by_one_and_the_terminal_is_left_as_it_was(terminal):
+    outer, inner = terminal
+    before, came = termios.tcgetattr(inner), []
+
+    def pressed(key):
+        came.append(key)
+        if key == "!":
+            raise RuntimeError("no such key")
+
+    keyboard = Keyboard(pressed, inner)
+    wait_for(lambda: not termios.tcgetattr(inner)[3] & termios.ICANON)
+    os.write(outer, b"\x1b[A")
+    time.sleep(0.3)
+    os.write(outer, b"!")
+    wait_for(lambda: "!" in came)
+    os.write(outer, b" q\xff")
+    wait_for(lambda: len(came) == 4)
+    assert came[:3] == ["!", " ", "q"]
+    os.write(outer, b"\x1a\x13")
+    wait_for(lambda: len(came) == 6)
+    assert came[4:] == ["\x1a", "\x13"], "neither suspends the process nor freezes the picture"
+    keyboard.close()
+    keyboard.close()
+    assert termios.tcgetattr(inner) == before
+
+
+def test_without_a_terminal_there_are_no_keys_and_one_that_goes_away_ends_them_only(terminal):
+    read, write = os.pipe()
+    keyboard = Keyboard(pytest.fail, read)
+    os.write(write, b"s")
+    assert not keyboard.is_terminal
+    keyboard.close()
+    os.close(read)
+    os.close(write)
+    outer, inner = terminal
+    pressed = []
+    keyboard = Keyboard(pressed.append, inner)
+    wait_for(lambda: not termios.tcgetattr(inner)[3] & termios.ICANON)
+    os.close(outer)
+    wait_for(lambda: not keyboard._thread.is_alive())
+    keyboard.close()
+    assert pressed == []

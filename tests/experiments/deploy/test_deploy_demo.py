@@ -5,16 +5,14 @@ import re
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
-from steerclear.experiments import cli
 from steerclear.experiments.deploy.demo import PORTS, Demo, demo_file, end_with_parent
 from steerclear.experiments.sim_boats.demo import demo_text
 from steerclear.shield.bridge.fleet_file import load_fleet
 from steerclear.shield.exceptions import BridgeError
-from typer.testing import CliRunner
+from waiting import is_running, wait_for
 
 STARTER = """
 import sys, time
@@ -31,18 +29,14 @@ def ports_in(text):
     return {int(port) for port in re.findall(r"127\.0\.0\.1:(\d+)", text)}
 
 
-def ports_of(path):
-    return ports_in(path.read_text())
-
-
 def test_every_demonstration_has_a_folder_and_ports_of_its_own(tmp_path):
     first, second = demo_file(tmp_path / "demo"), demo_file(tmp_path / "demo")
     assert first.parent != second.parent
     assert {path.parent.parent for path in (first, second)} == {tmp_path / "demo"}
     for path in (first, second):
         assert load_fleet(path).team == "blue"
-        assert len(ports_of(path)) == 3
-    assert not ports_of(first) & set(PORTS)
+        assert len(ports_in(path.read_text())) == 3
+    assert not ports_in(first.read_text()) & set(PORTS)
     assert ports_in(demo_text()) == set(PORTS), "the ports replaced are those of the file"
     (tmp_path / "file").write_text("")
     with pytest.raises(BridgeError, match="cannot write"):
@@ -61,14 +55,6 @@ def test_a_demonstration_that_cannot_begin_says_why_and_leaves_nothing(tmp_path)
     assert (tmp_path / "boats.txt").read_text() == "said before", "what an earlier one said is kept"
 
 
-def is_alive(pid):
-    try:
-        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
-    except OSError:
-        return False
-    return state not in ("Z", "X")
-
-
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="asks /proc who lives")
 def test_killed_with_9_it_takes_its_processes_with_it(tmp_path):
     command = [sys.executable, "-c", STARTER, str(demo_file(tmp_path))]
@@ -76,13 +62,10 @@ def test_killed_with_9_it_takes_its_processes_with_it(tmp_path):
         try:
             pids = [int(word) for word in starter.stdout.readline().split()]
             assert len(pids) == 2
-            assert all(map(is_alive, pids))
+            assert all(map(is_running, pids))
         finally:
             starter.kill()
-    end = time.monotonic() + 8.0
-    while any(map(is_alive, pids)) and time.monotonic() < end:
-        time.sleep(0.05)
-    assert not any(map(is_alive, pids))
+    wait_for(lambda: not any(map(is_running, pids)), 8.0)
 
 
 def test_a_closed_stream_ends_the_process_in_order(monkeypatch):
@@ -99,26 +82,3 @@ def test_a_closed_stream_ends_the_process_in_order(monkeypatch):
         os.close(theirs)
         thread.join(10.0)
     assert told == [(os.getpid(), signal.SIGTERM), 1]
-
-
-@pytest.mark.parametrize("option", ["--policy", "--opponents"])
-def test_an_unknown_policy_is_refused_before_boats_are_simulated(option, monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("steerclear.experiments.cli_boats.Demo", None)
-    told = CliRunner().invoke(cli.app, ["deploy", "--demo", option, "medum"])
-    assert told.exit_code == 2
-    assert "did you mean medium" in " ".join(told.output.split())
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("command", [("deploy", "--demo"), ("preflight", "FLEET.yaml")])
-@pytest.mark.parametrize(
-    ("option", "value"), [("--wait", "nan"), ("--wait", "-5"), ("--wait", "1e9"), ("--speed", "0"), ("--speed", "nan")]
-)
-def test_waits_and_speeds_out_of_range_are_refused_at_once(command, option, value, monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("steerclear.experiments.cli_boats.Demo", None)
-    told = CliRunner().invoke(cli.app, [*command, option, value])
-    assert told.exit_code == 2
-    assert f"give {option} more than 0" in " ".join(told.output.split())
-    assert list(tmp_path.iterdir()) == []

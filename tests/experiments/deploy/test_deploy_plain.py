@@ -1,4 +1,4 @@
-"""Lines instead of a dashboard and of checks, logs that never make the loop wait, counts of a run, its priority."""
+"""Lines instead of a dashboard and of checks, counts of a run, and what keeps it on time: logs, priority, compiling."""
 
 import dataclasses
 import io
@@ -10,10 +10,11 @@ import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
-from made_ticks import Stream
+from logged_runs import Encounter, header_of
 from rich.console import Console
 from steerclear.experiments.cli_boats import show_check
 from steerclear.experiments.deploy.keys import FIGURES, figure_rows
@@ -34,9 +35,8 @@ from steerclear.shield.fleet import Fleet
 
 
 @pytest.fixture
-def ticks(fleet_of):
-    stream = Stream(fleet_of(2))
-    return [stream.tick() for _ in range(5)]
+def ticks():
+    return list(Encounter(header_of(), 5))
 
 
 def said_of(ticks, every_s=0.3):
@@ -183,3 +183,31 @@ def test_the_loop_goes_first_the_runners_other_threads_after_it_or_nobody(monkey
         assert (system.given[own], system.given[2]) == (first, others), "else they would make the loop wait"
         assert system.given[3] == (os.SCHED_FIFO, 7), "it has more already"
     assert system.given == tasks, "as they were"
+
+
+TESTS = Path(__file__).parents[2]
+COMPILED_LATE = """
+from bridge_fakes import pair
+from test_fault_figures import DRILLS, STRUCK_S
+from steerclear.experiments.deploy.quiet import warm_up
+from steerclear.shield import jit
+
+world = pair()
+world.run(0.0)
+warm_up(world.fleet)
+made, load = [], jit._Kept.load_overload
+jit._Kept.load_overload = lambda kept, *args: made.append(kept._name) or load(kept, *args)
+world.run(6.0)
+for name in ("telemetry frozen, fresh time stamps", "telemetry jumps 30 m, the feed does not", "disk full"):
+    again = pair()
+    again.run(12.0, lambda world: world.clock.now_s() >= STRUCK_S - 1e-6 and DRILLS[name][0](world))
+print("late:", made)
+"""
+
+
+def test_no_machine_code_is_made_while_boats_are_steered():
+    path = [str(TESTS), str(TESTS / "shield"), str(TESTS / "shield" / "bridge")]
+    program = f"import sys; sys.path[:0] = {path!r}\n{COMPILED_LATE}"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == "late: []"

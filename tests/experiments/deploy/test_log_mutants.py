@@ -2,17 +2,17 @@
 
 import dataclasses
 import json
-import random
 
+import numpy as np
 import pytest
 from forged_logs import read_records, write_records
 from logged_runs import write_log
+from mutants import changed
 from steerclear.experiments.deploy.replay import as_content, judge, replay_log
 from steerclear.shield.bridge.blackbox import LogReader
 from steerclear.shield.exceptions import SteerclearError
 
 FAST, MANY = 150, 5000
-ODD = (None, True, -1, 0, 1e308, 2**70, "", "nan", "x", [], {}, [1], {"a": 1}, [[]], "[", "{}", "null", "[1]")
 
 
 @pytest.fixture(scope="module")
@@ -22,37 +22,19 @@ def records(tmp_path_factory):
     return read_records(path)
 
 
-def places(content, path=()):
-    yield path
-    entries = content.items() if isinstance(content, dict) else enumerate(content) if isinstance(content, list) else ()
-    for key, value in entries:
-        yield from places(value, (*path, key))
-
-
-def changed(content, dice):
-    """The content with one value replaced or left out; texts that hold JSON are changed inside."""
-    path = dice.choice(list(places(content)))
-    if not path:
-        return dice.choice(ODD)
-    *way, last = path
-    node = content
-    for key in way:
-        node = node[key]
-    value = node[last]
-    if isinstance(value, str) and value[:1] in ("[", "{") and dice.random() < 0.8:
-        node[last] = json.dumps(changed(json.loads(value), dice))
-    elif isinstance(node, dict) and dice.random() < 0.2:
-        del node[last]
-    else:
-        node[last] = dice.choice(ODD)
-    return content
+def is_json(value):
+    return isinstance(value, str) and value[:1] in ("[", "{")
 
 
 def mutant(records, seed):
-    dice = random.Random(seed)
-    topic = dice.choice(["/header", "/header", "/tick", "/tick", "/tick", "/log", "/link"])
-    k = dice.choice([k for k, record in enumerate(records) if record.topic == topic] or [0])
-    data = json.dumps(changed(records[k].content, dice)).encode()
+    """The records with one changed; texts in it that hold JSON are changed inside."""
+    random = np.random.default_rng(seed)
+    topic = random.choice(["/header", "/header", "/tick", "/tick", "/tick", "/log", "/link"])
+    k = random.choice([k for k, record in enumerate(records) if record.topic == topic] or [0])
+    inner = {key: json.loads(text) for key, text in records[k].content.items() if is_json(text)}
+    content = changed({**records[k].content, **inner}, random)
+    outer = {key: json.dumps(content[key]) for key in inner if key in content}
+    data = json.dumps({**content, **outer}).encode()
     return [*records[:k], dataclasses.replace(records[k], data=data), *records[k + 1 :]]
 
 

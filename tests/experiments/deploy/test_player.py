@@ -1,5 +1,6 @@
 """A policy on the water is shown and answers what it does in the game; some steer boats without one."""
 
+import contextlib
 import dataclasses
 import math
 import re
@@ -24,7 +25,7 @@ EXACT = """
     seen.append(repr(sorted((str(k), np.ravel(v).tolist()) for k, v in global_state.items())))
     text = repr(seen) + agent_id
     self.calls += 1
-    return (1.5, zlib.crc32(text.encode()) % 36000 / 100.0 - 180.0)
+    return (1.5, zlib.crc32(text.encode()) % 3600 / 100.0 - 18.0)  # on into the other half, where boats are tagged
 """
 
 
@@ -38,29 +39,38 @@ def play_both(fleet, policy, snapshot_of, steps, seed=5, opponent="medium"):
     team.reset(env, ours, seed)
     other.reset(env, theirs, 2)
     player = load_player(Orders(cast_of(fleet), policy, seed=seed))
-    for step in range(steps):
-        play = player.play(snapshot_of(env, fleet, step))
-        actions = team.act(observations, infos) | other.act(observations, infos)
-        commands = env.core.commands(env.decode(actions)[np.newaxis])[0]
-        yield env, play, commands, [env.possible_agents.index(a) for a in ours], player, observations, infos
-        observations, *_, infos = env.step(actions)
-    player.close()
-    if hasattr(team, "close"):
-        team.close()
+    with contextlib.ExitStack() as stack:
+        for one in (player, team):
+            stack.callback(getattr(one, "close", lambda: None))
+        for step in range(steps):
+            play = player.play(snapshot_of(env, fleet, step))
+            actions = team.act(observations, infos) | other.act(observations, infos)
+            commands = env.core.commands(env.decode(actions)[np.newaxis])[0]
+            yield env, play, commands, [env.possible_agents.index(a) for a in ours], player, observations, infos
+            observations, *_, infos = env.step(actions)
 
 
 @pytest.mark.parametrize(
-    ("policy", "side"), [("medium", "blue"), ("hard", "red"), ("easy", "blue"), ("random", "red"), ("hidden", "red")]
+    ("policy", "side"), [("medium", "blue"), ("hard", "red"), ("hidden", "red"), ("random", "red")]
 )
 def test_scripted_policies_answer_bit_for_bit_what_they_answer_in_the_game(fleet_of, snapshot_of, policy, side):
-    for _, play, commands, ours, *_ in play_both(fleet_of(team=side), policy, snapshot_of, 150):
+    """As absolute commands for all boats of the file, of which rescue and the other team are not ours."""
+    fleet = fleet_of(team=side)
+    for env, play, commands, ours, *_ in play_both(fleet, policy, snapshot_of, 100):
         assert play.problems == ()
         np.testing.assert_array_equal(play.relative[ours], commands[ours])
+        rows = [i for i, boat in enumerate(fleet.boats) if boat.agent is not None and boat.name.startswith(side)]
+        assert play.commands.shape == (7, 2)
+        assert np.isnan(np.delete(play.commands, rows, axis=0)).all()
+        told_rad = play.commands[rows, 1]
+        turned = np.degrees(told_rad) - env.core.state[0, ours, L.HEADING] - commands[ours, 1]
+        assert np.allclose((turned + 180.0) % 360.0 - 180.0, 0.0, atol=1e-9)
+        assert ((told_rad >= 0.0) & (told_rad < 2.0 * math.pi)).all()
 
 
 def test_a_submission_sees_and_answers_bit_for_bit_what_it_does_in_the_game(fleet_of, snapshot_of, write_entry):
     entry = write_entry(EXACT, start="self.calls = 0", head="import zlib\nimport numpy as np")
-    driven = 0
+    driven = after = 0
     for env, play, commands, ours, player, observations, infos in play_both(fleet_of(), entry, snapshot_of, 250):
         assert play.problems == ()
         np.testing.assert_array_equal(play.relative[ours], commands[ours])
@@ -69,19 +79,10 @@ def test_a_submission_sees_and_answers_bit_for_bit_what_it_does_in_the_game(flee
         for agent_id, row in player.observer.observations().items():
             np.testing.assert_array_equal(row, observations[agent_id])
         assert repr(player.observer.infos()) == repr(infos)
-    assert driven, "boats were tagged or out of bounds, and driven by the game"
-
-
-def test_commands_are_absolute_and_for_all_boats_of_the_file(fleet_of, snapshot_of):
-    fleet = fleet_of()
-    for env, play, commands, *_ in play_both(fleet, "medium", snapshot_of, 5):
-        heading = env.core.state[0, :, L.HEADING]
-        assert play.commands.shape == (7, 2)
-        assert np.isnan(play.commands[[3, 4, 5, 6]]).all(), "rescue and red are not ours"
-        turned = np.degrees(play.commands[:3, 1]) - heading[:3] - commands[:3, 1]
-        assert np.allclose((turned + 180.0) % 360.0 - 180.0, 0.0, atol=1e-9)
-        assert (play.commands[:3, 1] >= 0.0).all()
-        assert (play.commands[:3, 1] < 2.0 * math.pi).all()
+        after += driven > 0
+        if after == 10:
+            return
+    pytest.fail("no boat was tagged or out of bounds, and driven by the game")
 
 
 @pytest.mark.parametrize(
@@ -89,11 +90,9 @@ def test_commands_are_absolute_and_for_all_boats_of_the_file(fleet_of, snapshot_
     [
         ("return float('nan')", "not finite"),
         ("return (1e9, 0.0)", "too large"),
-        ("return (float('inf'), 0.0)", "not finite"),
         ("return None", "no answer"),
         ("return 'nowhere'", "field point"),
         ("raise KeyError('wall_9')", "KeyError"),
-        ("raise SystemExit(3)", "SystemExit"),
         ("import sys; sys.exit()", "SystemExit"),
     ],
 )

@@ -1,6 +1,8 @@
 """Whatever a policy does in its process, the loop's calls return at once and say what is the matter."""
 
+import itertools
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -10,16 +12,14 @@ import time
 
 import numpy as np
 import pytest
-from made_ticks import wait_for
 from steerclear.env.mctf import MctfEnv
 from steerclear.experiments.deploy import policy_process
 from steerclear.experiments.deploy.player import Orders, cast_of, load_player
 from steerclear.experiments.deploy.policy_process import PolicyProcess
-from steerclear.shield.exceptions import PolicyError
+from waiting import is_running, wait_for
 
 PATIENCE_S = 180.0
 """A child imports the game, and compiles it when nobody has before."""
-COUNTS = "self.calls = 0"
 
 
 @pytest.fixture
@@ -41,18 +41,17 @@ def run(fleet_of):
 @pytest.fixture
 def ask(fleet_of, snapshot_of):
     """Shows snapshots at some rate until a condition on the answer holds; answers it, and how long calls took."""
-    env = MctfEnv(cast_of(fleet_of(1)).config)
+    env, numbers = MctfEnv(cast_of(fleet_of(1)).config), itertools.count(1)
 
-    def until(process, condition, number=1):
+    def until(process, condition):
         end_s, spent_s = time.monotonic() + PATIENCE_S, []
         while time.monotonic() < end_s:
             began_s = time.perf_counter()
-            process.offer(snapshot_of(env, fleet_of(1), number, process._clock.now_s()))
+            process.offer(snapshot_of(env, fleet_of(1), next(numbers), process._clock.now_s()))
             answer = process.latest()
             spent_s.append(time.perf_counter() - began_s)
             if condition(answer):
                 return answer, spent_s
-            number += 1
             time.sleep(0.01)
         pytest.fail(f"no such answer; the last one was {process.latest()}")
 
@@ -61,15 +60,6 @@ def ask(fleet_of, snapshot_of):
 
 def answered(answer):
     return answer.commands is not None and answer.age_s < 5.0 and not answer.fault
-
-
-def is_running(pid):
-    try:
-        os.kill(pid, 0)
-        with open(f"/proc/{pid}/stat") as file:
-            return file.read().rsplit(")", 1)[1].split()[0] != "Z"
-    except (ProcessLookupError, FileNotFoundError):
-        return False
 
 
 def wait_until(condition):
@@ -88,129 +78,111 @@ def test_a_policy_answers_in_its_process_what_it_answers_here(run, ask, fleet_of
     assert process.restarts == 0
 
 
-def once(mark, after, act):
-    """A submission that does something once, after so many calls."""
-    return f"""
-        import os, sys
-        self.calls += 1
-        if self.calls > {after} and not os.path.exists({str(mark)!r}):
-            open({str(mark)!r}, "w").close()
-            {act}
-        return (1.0, 0.0)
-    """
+LIFE = """
+import os, sys
+stage = len(os.listdir(NOTES))
+if stage == 0:
+    return (1e9, float("nan"))
+if stage == 1:
+    try:
+        input("command? ")
+    except EOFError:
+        pass
+    print("x" * 200_000)
+    sys.stderr.write("y" * 100_000 + "\\n")
+    sys.stderr.flush()
+if stage in (2, 4, 6):
+    open(os.path.join(NOTES, str(stage)), "w").close()
+if stage == 2:
+    print("the end is near")
+    sys.stdout.flush()
+    os._exit(7)
+if stage == 4:
+    os.kill(os.getpid(), 9)
+while stage == 6:
+    pass
+return (1.0, 0.0)
+"""
+"""A submission that does one thing after the other; how many files there are in a folder says what."""
 
 
-def test_a_policy_that_hangs_is_ended_and_started_again(run, ask, write_entry, tmp_path):
-    process = run(write_entry(once(tmp_path / "hung", 8, "while True: pass"), start=COUNTS), deadline_s=0.6)
-    ask(process, answered)
-    answer, spent_s = ask(process, lambda answer: "has not answered for" in answer.fault)
-    assert answer.commands is not None, "the last answer stays, and its age grows"
-    answer, more_s = ask(process, lambda answer: "did not answer within 0.6 s" in answer.fault)
-    ask(process, answered, number=10**6)
-    assert process.restarts == 1
-    assert np.median(spent_s + more_s) < 0.02
-    assert max(spent_s + more_s) < 1.0, "no call waited for the policy or for its end"
+def test_whatever_a_policy_does_calls_return_at_once_and_say_what_is_the_matter(run, ask, write_entry, tmp_path):
+    """It answers nonsense, reads and floods, ends itself, is killed and hangs; it is started again each time."""
+    notes, spent_s = tmp_path / "notes", []
+    notes.mkdir()
+    process = run(write_entry(LIFE.replace("NOTES", repr(str(notes)))), deadline_s=1.0)
 
+    def until(condition):
+        answer, more_s = ask(process, condition)
+        spent_s.extend(more_s)
+        return answer
 
-@pytest.mark.parametrize(
-    ("death", "words"),
-    [
-        (
-            "print('the end is near'); sys.stdout.flush(); os._exit(7)",
-            'ended itself with exit status 7, its last words: "the end is near"',
-        ),
-        ("os.kill(os.getpid(), 9)", "was ended by SIGKILL"),
-        pytest.param("import ctypes; ctypes.string_at(0)", "was ended by SIGSEGV", marks=pytest.mark.study),
-        pytest.param("os.closerange(3, 64); return 4", "; starting it again", marks=pytest.mark.study),
-    ],
-)
-def test_a_policy_that_dies_is_started_again_and_its_end_is_told(run, ask, write_entry, tmp_path, death, words):
-    process = run(write_entry(once(tmp_path / "died", 4, death), start=COUNTS))
-    answer, spent_s = ask(process, lambda answer: words in answer.fault)
-    assert "starting it again" in answer.fault
-    assert max(spent_s) < 1.0
-    if words == "was ended by SIGKILL":
-        ask(process, answered, number=10**6)
-        assert process.restarts == 1
+    def go_on():
+        (notes / f"{len(list(notes.iterdir()))}_").touch()
 
-
-def test_unusable_answers_leave_the_boat_without_a_command(run, ask, write_entry):
-    process = run(write_entry("return (1e9, float('nan'))"))
-    answer, _ = ask(process, lambda answer: answer.commands is not None)
+    answer = until(lambda answer: answer.commands is not None)
     assert np.isnan(answer.commands.values).all()
     assert "blue_1: not finite" in answer.fault
-
-
-def test_a_policy_that_floods_and_reads_only_slows_itself(run, ask, write_entry):
-    entry = write_entry(
-        """
-        import sys
-        try:
-            input("command? ")
-        except EOFError:
-            pass
-        print("x" * 200_000)
-        sys.stderr.write("y" * 100_000)
-        sys.stderr.flush()
-        return (1.0, 0.0)
-        """
-    )
-    process = run(entry, deadline_s=20.0)
-    _, spent_s = ask(process, answered)
+    go_on()
+    until(answered)
     first_s = process._taken_s
-    _, more_s = ask(process, lambda answer: answered(answer) and process._taken_s > first_s, number=10**6)
-    assert process.restarts == 0
+    until(lambda answer: answered(answer) and process._taken_s > first_s)
+    assert process.restarts == 0, "one that floods and reads only slows itself"
     assert 0 < len(process._worker.output()) <= 4096
-    assert np.median(spent_s + more_s) < 0.02
+    for number, words in enumerate(
+        (
+            'ended itself with exit status 7, its last words: "the end is near"; starting it again',
+            "was ended by SIGKILL; starting it again",
+            "did not answer within 1 s; starting it again",
+        ),
+        1,
+    ):
+        go_on()
+        if number == 3:
+            answer = until(lambda answer: "has not answered for" in answer.fault)
+            assert answer.commands is not None, "the last answer stays, and its age grows"
+        until(lambda answer: words in answer.fault)  # noqa: B023
+        until(answered)
+        assert process.restarts == number
+    assert np.median(spent_s) < 0.02
+    assert max(spent_s) < 1.0, "no call waited for the policy or for its end"
 
 
-@pytest.mark.parametrize(
-    ("policy", "words"), [("mediun", "did you mean medium"), ("missing/entry.zip", "missing/entry.zip")]
-)
-def test_a_policy_that_cannot_be_loaded_is_one_clear_error_at_the_start(run, policy, words):
-    with pytest.raises(PolicyError, match=words):
-        run(policy)
-
-
-LEAVES = {
-    "a child": "child = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)'])\nsay(child.pid)",
-    "what left its session": """
+LEAVES = """
+import os, subprocess, sys, tempfile, time
+kept = tempfile.mkdtemp()
+def say(name, pid):
+    open(os.path.join(NOTES, name), "w").write(str(pid))
+say("child", subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"]).pid)
 if os.fork() == 0:
     os.setsid()
     if os.fork() == 0:
-        say(os.getpid())
+        say("grandchild", os.getpid())
         time.sleep(600)
     os._exit(0)
-""",
-}
-
-
-@pytest.mark.parametrize("kind", LEAVES)
-def test_what_it_started_ends_with_it(run, ask, write_entry, tmp_path, kind):
-    note = tmp_path / "pid"
-    say = f"import os, subprocess, sys, time\ndef say(pid):\n    open({str(note)!r}, 'w').write(str(pid))\n"
-    process = run(write_entry("return (1.0, 0.0)", start=say + LEAVES[kind]))
-    ask(process, answered)
-    wait_until(lambda: note.exists() and note.read_text())  # it writes when it comes to it
-    assert is_running(int(note.read_text()))
-    process.close()
-    process.close()
-    wait_until(lambda: not is_running(int(note.read_text())))
-
-
-FLEET = """
-version: 1
-field: {origin: {latitude_deg: 42.0, longitude_deg: -71.0}, size_m: [80, 40]}
-geofence: {xmin_m: -20, ymin_m: -20, xmax_m: 100, ymax_m: 60}
-team: blue
-feed: {listen: "127.0.0.1:14700"}
-boats:
-  - {name: b, agent: agent_0, platform: heron, link: {kind: mavlink, address: "udpin:127.0.0.1:14550", system_id: 1}}
-  - {name: r, agent: agent_1, platform: heron, contact: feed}
 """
 
 
-def test_it_ends_when_the_runner_is_killed(write_entry, tmp_path):
+def test_what_it_started_and_wrote_ends_with_it(run, ask, write_entry, tmp_path, monkeypatch):
+    """Also what left its session."""
+    notes, temporary = tmp_path / "notes", tmp_path / "temporary"
+    for folder in (notes, temporary):
+        folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
+    process = run(write_entry("return (1.0, 0.0)", start=LEAVES.replace("NOTES", repr(str(notes)))))
+    ask(process, answered)
+    (folder,) = temporary.iterdir()
+    assert len(list(folder.iterdir())) >= 2, "its stage, and what it made itself"
+    wait_until(lambda: len([note for note in notes.iterdir() if note.read_text()]) == 2)
+    pids = [int(note.read_text()) for note in notes.iterdir()]
+    assert all(map(is_running, pids))
+    process.close()
+    process.close()
+    wait_until(lambda: not any(map(is_running, pids)))
+    assert list(temporary.iterdir()) == []
+
+
+def test_it_ends_when_the_runner_is_killed(fleet_of, write_entry, tmp_path):
     """Also while the policy never answers."""
     note, folder = tmp_path / "pid", tmp_path / "temporary"
     folder.mkdir()
@@ -224,17 +196,16 @@ def test_it_ends_when_the_runner_is_killed(write_entry, tmp_path):
             pass
         return 4
         """,
-        start=COUNTS,
+        start="self.calls = 0",
     )
     script = f"""
-        import time, numpy as np
+        import pickle, time, numpy as np
         from steerclear.experiments.deploy.policy_process import PolicyProcess
-        from steerclear.shield.bridge.fleet_file import parse_fleet
         from steerclear.shield.bridge.messages import Snapshot
-        process = PolicyProcess(parse_fleet({FLEET!r}), {entry!r}, 1e6)
+        process = PolicyProcess(pickle.loads({pickle.dumps(fleet_of(1))!r}), {entry!r}, 1e6)
         process.start()
         while True:
-            process.offer(Snapshot(0, 0.0, np.zeros((2, 4))))
+            process.offer(Snapshot(0, 0.0, np.zeros((3, 4))))
             time.sleep(0.05)
     """
     environment = {**os.environ, "TMPDIR": str(folder)}
@@ -245,16 +216,6 @@ def test_it_ends_when_the_runner_is_killed(write_entry, tmp_path):
             runner.send_signal(signal.SIGKILL)
     wait_until(lambda: not is_running(int(note.read_text())))
     assert list(folder.iterdir()) == []
-
-
-def test_what_a_submission_leaves_in_temporary_files_goes_with_its_process(run, write_entry, tmp_path, monkeypatch):
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
-    (tmp_path / "temporary").mkdir()
-    process = run(write_entry("return 4", start="import tempfile; self.kept = tempfile.mkdtemp()"))
-    (folder,) = (tmp_path / "temporary").iterdir()
-    assert len(list(folder.iterdir())) >= 2, "its stage, and what it made itself"
-    process.close()
-    assert list((tmp_path / "temporary").iterdir()) == []
 
 
 class Liar:

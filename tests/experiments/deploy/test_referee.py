@@ -5,20 +5,17 @@ import json
 import math
 import os
 import signal
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 from json_keys import KEYS, undocumented
-from made_ticks import repeating, wait_for
 from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
 from steerclear.experiments.cli import app
 from steerclear.experiments.deploy import referee as referee_module
 from steerclear.experiments.deploy.demo import free_ports
-from steerclear.experiments.deploy.referee import Referee, Umpire, game_config, player_names, state_of
+from steerclear.experiments.deploy.referee import Referee, Umpire, game_config, game_obstacles, player_names, state_of
 from steerclear.experiments.sim_boats import AutopilotSettings, SimFleet
 from steerclear.shield.bridge.clock import ManualClock, MonotonicClock
 from steerclear.shield.bridge.feed import FeedReceiver, FeedSender, Fix, GameState
@@ -26,7 +23,10 @@ from steerclear.shield.bridge.fleet_file import load_fleet, parse_fleet
 from steerclear.shield.bridge.messages import Contact
 from steerclear.shield.exceptions import BridgeError, FleetFileError, GameError
 from steerclear.shield.platforms import layout as L
+from steerclear.shield.surroundings import OPEN_WATER
+from steerclear.shield.wrappers.mctf import MctfReader
 from typer.testing import CliRunner
+from waiting import repeating, wait_for
 
 NAMES = ("b1", "b2", "r1", "r2")
 PLACES = {"b1": (25.0, 10.0), "b2": (25.0, 30.0), "r1": (55.0, 10.0), "r2": (55.0, 30.0)}
@@ -111,7 +111,9 @@ def test_the_umpire_of_a_simulated_game_says_what_the_game_says():
         for team in teams:
             actions |= team.act(observations, infos)
         observations, *_, infos = env.step(actions)
-    assert {"grabs the flag", "is free again"} <= happened, happened
+        if step > 300 and {"grabs the flag", "is free again"} <= happened:
+            return
+    pytest.fail(f"happened: {happened}")
 
 
 def test_it_waits_for_all_boats_and_says_for_whom():
@@ -174,21 +176,24 @@ def hub(fleet, places):
         yield
 
 
-def test_runners_hear_how_the_game_stands_over_the_feed(fleet_file):
-    fleet, clock, told = load_fleet(fleet_file()), MonotonicClock(), []
+def test_the_command_keeps_a_game_and_runners_hear_how_it_stands(fleet_file, tmp_path):
+    path, clock = fleet_file(), MonotonicClock()
+    fleet = load_fleet(path)
     with (
         FeedReceiver(fleet.feed.listen, fleet.frame, clock, boats=fleet.names) as runner,
-        Referee(fleet, clock) as referee,
         hub(fleet, {"b1": (33.0, 20.0), "r1": (34.0, 20.0)}),
     ):
-        why = referee.run(lambda state, events: told.extend(events), lambda: False, rate_hz=20.0, limit_s=60.0)
-        last = runner.game()
-    assert why == "over"
-    assert told[0] == "the game begins"
-    assert isinstance(last, GameState)
-    assert last.over
-    assert last.boats["r1"].tagged, "one blue boat at its side, one red boat beside it"
-    assert referee.umpire.core.state[0, 0, :2] == pytest.approx((33.0, 20.0), abs=1e-3)
+        result = CliRunner().invoke(app, ["referee", str(path), "--json", str(tmp_path / "game.json")])
+        heard = runner.game()
+    assert result.exit_code == 0, result.output
+    assert "the game begins" in result.output
+    content = json.loads((tmp_path / "game.json").read_text())
+    assert undocumented(content, KEYS["referee"]) == []
+    assert (content["ended"], content["game"]["over"]) == ("over", True)
+    assert content["events"][0]["text"] == "the game begins"
+    assert isinstance(heard, GameState)
+    assert heard.over
+    assert heard.boats["r1"].tagged, "one blue boat at its side, one red boat beside it"
 
 
 def test_without_addresses_or_players_there_is_no_referee(fleet_file, fleet_of):
@@ -204,48 +209,20 @@ def test_without_addresses_or_players_there_is_no_referee(fleet_file, fleet_of):
         Umpire(GameConfig.preset("aamas2024", team_size=2), NAMES[:3])
 
 
-def test_the_command_keeps_a_game(fleet_file, tmp_path):
-    path = fleet_file()
-    with hub(load_fleet(path), {"b1": (33.0, 20.0), "r1": (60.0, 20.0)}):
-        result = CliRunner().invoke(app, ["referee", str(path), "--json", str(tmp_path / "game.json")])
-    assert result.exit_code == 0, result.output
-    assert "the game begins" in result.output
-    content = json.loads((tmp_path / "game.json").read_text())
-    assert undocumented(content, KEYS["referee"]) == []
-    assert (content["ended"], content["game"]["over"]) == ("over", True)
-    assert content["events"][0]["text"] == "the game begins"
-
-
-@pytest.mark.parametrize(
-    ("option", "value", "words"),
-    [
-        ("--rate", "0", "--rate is 0"),
-        ("--minutes", "-1", "--minutes is -1"),
-        ("--listen", "here", "HOST:PORT"),
-        ("--publish", "there", "HOST:PORT"),
-        ("--speed", "0", "clock speed"),
-    ],
-)
-def test_bad_options_are_one_line_and_status_2(fleet_file, option, value, words):
-    result = CliRunner().invoke(app, ["referee", str(fleet_file()), option, value])
-    assert result.exit_code == 2
-    assert words in result.output
-    assert len(result.output.strip().splitlines()) == 1
-
-
 def test_an_interrupted_referee_says_so(fleet_file):
-    path = fleet_file()
-    command = [sys.executable, "-m", "steerclear.experiments.cli", "referee", str(path)]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
-        try:
-            with hub(load_fleet(path), {"b1": (33.0, 20.0), "r1": (60.0, 20.0)}):
-                assert "the game begins" in process.stdout.readline()
-                os.kill(process.pid, signal.SIGINT)
-                _, said = process.communicate(timeout=60.0)
-        finally:
-            process.kill()
-    assert process.returncode == 130
-    assert "interrupted" in said
+    path, asked = fleet_file(), []
+    fleet = load_fleet(path)
+    with FeedReceiver(fleet.feed.listen, fleet.frame, MonotonicClock(), boats=fleet.names) as runner:
+
+        def interrupt():
+            if runner.game() is not None and not asked:
+                asked.append(True)
+                os.kill(os.getpid(), signal.SIGINT)
+
+        with hub(fleet, {"b1": (33.0, 20.0), "r1": (60.0, 20.0)}), repeating(interrupt):
+            result = CliRunner().invoke(app, ["referee", str(path)])
+    assert result.exit_code == 130
+    assert "interrupted" in result.stderr
 
 
 def test_with_signing_boats_and_referee_sign_what_they_say_and_nobody_else_is_heard(tmp_path):
@@ -269,3 +246,32 @@ def test_with_signing_boats_and_referee_sign_what_they_say_and_nobody_else_is_he
         wait_for(lambda: liar.send_positions([strange]) or runner.faults().get("unsigned", 0) > 3)
         assert set(runner.faults()) == {"unsigned"}
         assert runner.alarms() == ()
+
+
+def test_the_circle_is_the_one_the_simulator_gives_the_shield(fleet_of):
+    for team in ("blue", "red"):
+        fleet = fleet_of(team=team)
+        reader = MctfReader(MctfEnv(game_config(fleet)))
+        assert game_obstacles(fleet) == reader.surroundings(fleet.team_number, keep_out=True)
+
+
+def test_obstacles_of_the_rules_are_there_and_a_file_without_a_game_has_nothing(fleet_of):
+    fleet = fleet_of(more="rules: {obstacles: {circle: [[2.0, [40.0, 20.0]]], polygon: [[[50, 5], [55, 5], [52, 9]]]}}")
+    fixed = game_obstacles(fleet)
+    assert fixed.circles == ((40.0, 20.0, 2.0),)
+    assert fixed.polygons == (((50.0, 5.0), (55.0, 5.0), (52.0, 9.0)),)
+    alone = parse_fleet(
+        """
+version: 1
+field: {origin: {latitude_deg: 42.0, longitude_deg: -71.0}, size_m: [80, 40]}
+geofence: {xmin_m: -20, ymin_m: -20, xmax_m: 100, ymax_m: 60}
+team: blue
+boats: [{name: a, team: blue, platform: heron, link: {kind: mavlink, address: "udpin:127.0.0.1:1", system_id: 1}}]
+"""
+    )
+    assert game_obstacles(alone) is OPEN_WATER
+
+
+def test_rules_that_make_no_game_are_one_clear_error(fleet_of):
+    with pytest.raises(FleetFileError, match="flag_keepout"):
+        game_obstacles(fleet_of(more="rules: {flag_keepout_m: -1.0}"))

@@ -77,6 +77,7 @@ def test_ticks_that_come_unevenly_make_an_even_track(run):
         for tick in ticks
         if tick.number % 7 != 3
     ]
+    shaken.insert(50, shaken[49])  # a turn that stands twice
     even = tracks_of(shaken, header)
     assert np.allclose(np.diff(even.time_s), 0.1)
     k = min(len(even.states), len(tracks.states))
@@ -90,6 +91,9 @@ def test_the_game_is_in_the_record(run):
         "flags": [{"x_m": 1.0, "y_m": 2.0, "taken": False}, {"x_m": 3.0, "y_m": 4.0, "taken": True}],
         "captures": [2, 1],
     }
+    boats = tuple(dataclasses.replace(boat, ours=boat.name == "blue_1") for boat in header.boats)
+    # blue_2 is steered by another process; the rules for the radii to draw are not known
+    header = dataclasses.replace(header, boats=boats, preset="chess")
     tracks = tracks_of([dataclasses.replace(tick, game=game) for tick in ticks], header)
     record = record_of(header, tracks)
     meta = read_meta(record)
@@ -98,16 +102,9 @@ def test_the_game_is_in_the_record(run):
     assert record["flag_position"][5].tolist() == [[1.0, 2.0], [3.0, 4.0]]
     assert record["captures"][-1].tolist() == [2, 1]
     assert tracks.marked("driven")[:, 0].all()
-    assert meta["shielded"] == ["blue_1", "blue_2"]
+    assert meta["shielded"] == ["blue_1"]
     assert meta["policies"] == {"blue": "collider", "red": ""}
     assert meta["separation_m"] == PROMPT.separation_m
-
-
-def test_team_mates_of_another_process_are_not_ours(run):
-    header, ticks, _ = run
-    boats = tuple(dataclasses.replace(boat, ours=boat.name == "blue_1") for boat in header.boats)
-    tracks = tracks_of(ticks, dataclasses.replace(header, boats=boats))
-    assert tracks.ours.tolist() == [True, False, False, False]
 
 
 def test_a_log_without_boats_has_no_tracks(run):

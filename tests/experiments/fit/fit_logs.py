@@ -46,30 +46,49 @@ def degrees_of(x_m, y_m):
     return north, ORIGIN[1] + math.degrees(x_m / EARTH_M / math.cos(math.radians(ORIGIN[0])))
 
 
-def as_tlog(path, rows, systems=(1,)):
+def as_tlog(path, rows, systems=(1,), every=1, top=lambda time_s: 3.0, before_fix=0, component=None):
+    """A telemetry log: commands each row, positions every so many, WP_SPEED where it changes.
+
+    First some positions without a fix; positions of another component are elsewhere.
+    """
     boat, ground = mavlink.MAVLink(None, 1, 1), mavlink.MAVLink(None, 255, 190)
+    told = None
     with path.open("wb") as file:
-        for row in rows:
+
+        def put(sender, message, time_s):
+            file.write(struct.pack(">Q", round(1e6 * (1.7e9 + time_s))) + bytes(message.pack(sender)))
+
+        for k in range(before_fix):
+            put(boat, place_message(0, 0), (k - before_fix) / 5.0)
+        for k, row in enumerate(rows):
             for system in systems:
                 boat.srcSystem = system
-                for message in messages_of(row, system):
-                    mav = ground if message.get_type().startswith("SET") else boat
-                    file.write(struct.pack(">Q", int(1e6 * (1.7e9 + row[0]))) + bytes(message.pack(mav)))
+                attitude, place, command = messages_of(row, system, top(row[0]))
+                if top(row[0]) != told:
+                    told = top(row[0])
+                    put(boat, mavlink.MAVLink_param_value_message(b"WP_SPEED", told, 9, 1, 0), row[0])
+                put(ground, command, row[0])
+                if k % every == 0:
+                    put(boat, attitude, row[0])
+                    put(boat, place, row[0])
+                    if component is not None:
+                        put(mavlink.MAVLink(None, 1, component), place_message(100, 100), row[0])
 
 
-def messages_of(row, system):
+def place_message(latitude, longitude, *more):
+    return mavlink.MAVLink_global_position_int_message(0, latitude, longitude, 0, 0, *(more or (0, 0, 0, 0)))
+
+
+def messages_of(row, system, top_mps):
     _, x, y, heading, speed, told_speed, told_heading = row
     latitude, longitude = degrees_of(x, y)
     yaw, half = math.radians(heading), math.radians(told_heading) / 2.0
-    north, east = speed * math.cos(yaw), speed * math.sin(yaw)
-    place = [round(1e7 * latitude), round(1e7 * longitude), 0, 0, round(100 * north), round(100 * east), 0]
+    velocity = round(100 * speed * math.cos(yaw)), round(100 * speed * math.sin(yaw)), 0
+    q, thrust = [math.cos(half), 0, 0, math.sin(half)], told_speed / top_mps
     return [
-        mavlink.MAVLink_param_value_message(b"WP_SPEED", 3.0, 9, 1, 0),
         mavlink.MAVLink_attitude_message(0, 0.0, 0.0, yaw, 0.0, 0.0, 0.0),
-        mavlink.MAVLink_global_position_int_message(0, *place, round(100 * (heading % 360.0)) % 36000),
-        mavlink.MAVLink_set_attitude_target_message(
-            0, system, 1, 7, [math.cos(half), 0, 0, math.sin(half)], 0, 0, 0, told_speed / 3.0
-        ),
+        place_message(round(1e7 * latitude), round(1e7 * longitude), *velocity, round(100 * (heading % 360.0)) % 36000),
+        mavlink.MAVLink_set_attitude_target_message(0, system, 1, 7, q, 0, 0, 0, thrust),
     ]
 
 
@@ -83,22 +102,22 @@ FORMATS = {  # name: (type, format, columns)
 }
 
 
-def as_bin(path, rows, left_out=()):
-    """An ArduPilot log: formats first, then the messages."""
+def as_bin(path, rows, left_out=(), receivers=()):
+    """An ArduPilot log: formats first, then the messages; of several GPS ``receivers``, which has a fix."""
+    forms = {**FORMATS, "GPS": (132, "QBBf", "TimeUS,I,Status,Spd")} if receivers else FORMATS
     with path.open("wb") as file:
-        for name, (number, letters, columns) in FORMATS.items():
-            size = 3 + (86 if name == "FMT" else 8 + (8 if name == "POS" else 4))
+        for name, (number, letters, columns) in forms.items():
+            size = 3 + {"FMT": 86, "POS": 16, "GPS": 14 if receivers else 12}.get(name, 12)
             texts = name.encode(), letters.encode(), columns.encode()
             file.write(b"\xa3\x95\x80" + struct.pack("<BB4s16s64s", number, size, *texts))
         for time_s, x, y, heading, speed, told_speed, told_heading in rows:
-            latitude, longitude = degrees_of(x, y)
-            stamp = int(1e6 * (time_s + 100.0))
-            place = struct.pack("<Qii", stamp, round(1e7 * latitude), round(1e7 * longitude))
-            file.write(b"\xa3\x95" + bytes([130]) + place)
-            values = {"ATT": heading % 360.0, "GPS": speed, "THR": told_speed, "NTUN": told_heading % 360.0}
-            for name, value in values.items():
-                if name not in left_out:
-                    file.write(b"\xa3\x95" + bytes([FORMATS[name][0]]) + struct.pack("<Qf", stamp, value))
+            stamp, place = round(1e6 * (time_s + 100.0)), [round(1e7 * value) for value in degrees_of(x, y)]
+            said = [(130, "<Qii", *place), (131, "<Qf", heading % 360.0), (133, "<Qf", told_speed)]
+            said += [] if "NTUN" in left_out else [(134, "<Qf", told_heading % 360.0)]
+            said += [] if receivers else [(132, "<Qf", speed)]
+            said += [(132, "<QBBf", k, 4 if fix else 1, speed if fix else 0.0) for k, fix in enumerate(receivers)]
+            for number, form, *values in said:
+                file.write(b"\xa3\x95" + bytes([number]) + struct.pack(form, stamp, *values))
 
 
 WRITERS = {"csv": as_csv, "alog": as_alog, "tlog": as_tlog, "bin": as_bin}

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from steerclear.experiments import cli_logs
 from steerclear.experiments.cli import app
-from steerclear.experiments.fit.fitting import judge, measured_of, platform_file
-from steerclear.experiments.fit.models import RATE, Seen, distance_m, errors_of
-from steerclear.experiments.fit.reading import read_logs
+from steerclear.experiments.fit.fitting import fit_runs, measured_of, platform_file
+from steerclear.experiments.fit.models import RATE, distance_m, errors_of
 from steerclear.shield.platforms.files import parse_platform, to_text
 from typer.testing import CliRunner
 
@@ -15,13 +15,26 @@ STEPS = Path(__file__).parents[2] / "data" / "boat_steps"
 
 
 @pytest.fixture(scope="module")
-def runs():
-    return read_logs(sorted(STEPS.glob("*.csv")))
+def fitted(tmp_path_factory):
+    """What `steerclear fit` found, and the folder it wrote to."""
+    folder, found = tmp_path_factory.mktemp("fit"), []
+    logs = [str(path) for path in sorted(STEPS.glob("*.csv"))]
+    options = ["--kind", "rate", "--out", str(folder / "a" / "boat.yaml"), "--plot", str(folder / "b" / "boat.svg")]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(cli_logs, "fit_runs", lambda *given: found.append(fit_runs(*given)) or found[0])
+        done = CliRunner().invoke(app, ["fit", *logs, *options])
+    assert done.exit_code == 0, done.output
+    return found[0]["rate"], folder
 
 
-@pytest.fixture(scope="module")
-def judged(runs):
-    return judge(RATE, runs, Seen.of(runs))
+@pytest.fixture
+def judged(fitted):
+    return fitted[0]
+
+
+@pytest.fixture
+def runs(judged):
+    return judged.runs
 
 
 def test_the_recorded_boat_is_foretold_on_runs_that_were_held_out(judged):
@@ -69,10 +82,7 @@ def test_another_boat_is_foretold_worse(judged, runs):
     assert missed(vector) > 2.0 * missed(judged.fit.vector)
 
 
-def test_the_command_writes_file_and_picture_into_folders_that_it_makes(tmp_path):
-    file, picture = tmp_path / "a" / "boat.yaml", tmp_path / "b" / "boat.svg"
-    logs = [str(path) for path in sorted(STEPS.glob("*.csv"))]
-    done = CliRunner().invoke(app, ["fit", *logs, "--kind", "rate", "--out", str(file), "--plot", str(picture)])
-    assert done.exit_code == 0, done.output
-    assert parse_platform(file.read_text()).platform.name == "boat"
-    assert picture.read_text().startswith("<?xml")
+def test_the_command_writes_file_and_picture_into_folders_that_it_makes(fitted):
+    judged, folder = fitted
+    assert parse_platform((folder / "a" / "boat.yaml").read_text()) == platform_file(judged, "boat")
+    assert (folder / "b" / "boat.svg").read_text().startswith("<?xml")

@@ -1,15 +1,10 @@
 """A pymavlink connection to a simulated fleet that lives only when told."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
 
 from pymavlink import mavutil
-from pymavlink.dialects.v20 import ardupilotmega as mavlink
-from steerclear.experiments.sim_boats import AutopilotSettings, SimFleet
+from steerclear.experiments.sim_boats import AutopilotSettings
 
 READY = AutopilotSettings(boot_s=0.0)
 STEP_S = 0.1
@@ -22,12 +17,12 @@ class Station:
         heard: messages so far.
     """
 
-    def __init__(self, fleet: SimFleet, address: str) -> None:
+    def __init__(self, fleet, address):
         self.fleet = fleet
         self.link = mavutil.mavlink_connection(address, dialect="ardupilotmega", source_system=255)
-        self.heard: list[Any] = []
+        self.heard = []
 
-    def run(self, seconds: float, each_step: Any = None) -> None:
+    def run(self, seconds, each_step=None):
         """Let simulated time pass, listening."""
         for _ in range(round(seconds / STEP_S)):
             if each_step is not None:
@@ -36,25 +31,25 @@ class Station:
             while (message := self.link.recv_match(blocking=False)) is not None:
                 self.heard.append(message)
 
-    def call(self) -> None:
+    def call(self):
         """Say that we are there, so that boats that listen know where to send."""
         self.link.mav.heartbeat_send(6, 8, 0, 0, 0)
 
-    def guide(self, boat: int) -> None:
+    def guide(self, boat):
         """Arm a boat in GUIDED, with its position at 20 Hz."""
         for command, *values in ((511, 33, 50_000), (176, 1, 15), (400, 1)):
             self.link.mav.command_long_send(boat, 1, command, 0, *values, *[0] * (7 - len(values)))
 
-    def steer(self, boat: int, heading_rad: float, thrust: float) -> None:
+    def steer(self, boat, heading_rad, thrust):
         """Command heading and speed."""
         q = [math.cos(heading_rad / 2.0), 0.0, 0.0, math.sin(heading_rad / 2.0)]
         self.link.mav.set_attitude_target_send(0, boat, 1, 7, q, 0, 0, 0, thrust)
 
-    def of(self, kind: str, boat: int) -> list[Any]:
+    def of(self, kind, boat):
         """Messages of a type from a boat."""
         return [m for m in self.heard if m.get_type() == kind and m.get_srcSystem() == boat]
 
-    def positions(self, boat: int) -> list[tuple[float, float, float]]:
+    def positions(self, boat):
         """Time since boot s and field position m of each GLOBAL_POSITION_INT of a boat."""
         return [
             (m.time_boot_ms / 1000.0, *self.fleet.frame.to_field_m(m.lat * 1e-7, m.lon * 1e-7))
@@ -63,7 +58,7 @@ class Station:
 
 
 @contextmanager
-def station(fleet: SimFleet, address: str = "") -> Iterator[Station]:
+def station(fleet, address=""):
     """A station on a boat's address, the fleet closed at the end."""
     opened = None
     try:
@@ -74,6 +69,3 @@ def station(fleet: SimFleet, address: str = "") -> Iterator[Station]:
         if opened is not None:
             opened.link.close()
         fleet.close()
-
-
-__all__ = ["READY", "Station", "mavlink", "station"]

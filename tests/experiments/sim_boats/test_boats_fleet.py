@@ -1,25 +1,25 @@
 import itertools
+import json
 import math
-import socket
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
 from boat_links import READY, station
-from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from json_keys import KEYS, undocumented
+from steerclear.env.record import load
+from steerclear.experiments.cli import app
+from steerclear.experiments.deploy.demo import demo_file, free_ports
 from steerclear.experiments.sim_boats import RadioSettings, SimBoat, SimFleet
-from steerclear.experiments.sim_boats.faults import faults_page
+from steerclear.experiments.sim_boats.faults import Incident, faults_page, parse_incident
+from steerclear.shield.bridge.clock import ManualClock
+from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import layout as L
+from typer.testing import CliRunner
+from waiting import wait_for
 
 HERE = "127.0.0.1"
-
-
-def free_port(kind=socket.SOCK_DGRAM):
-    with socket.socket(socket.AF_INET, kind) as probe:
-        probe.bind((HERE, 0))
-        return probe.getsockname()[1]
 
 
 def test_the_page_of_faults_is_made_of_the_code():
@@ -33,8 +33,7 @@ def alone(**settings):
 
 @pytest.mark.parametrize("kind", ["", "udpout", "udpin", "tcp"])
 def test_boats_behind_every_kind_of_link(kind):
-    port = free_port(socket.SOCK_STREAM if kind == "tcp" else socket.SOCK_DGRAM)
-    address = f"{kind}:{HERE}:{port}" if kind else ""
+    address = f"{kind}:{HERE}:{free_ports(1)[0]}" if kind else ""
     fleet = SimFleet([SimBoat("b", address=address, system_id=9)], autopilot=READY)
     with station(fleet) as ground:
         assert fleet.addresses["b"] == address or not kind
@@ -48,7 +47,7 @@ def test_boats_behind_every_kind_of_link(kind):
 
 
 def test_boats_share_a_port_and_hear_only_what_is_for_them():
-    address = f"udpout:{HERE}:{free_port()}"
+    address = f"udpout:{HERE}:{free_ports(1)[0]}"
     boats = [SimBoat(f"b{i}", address=address, system_id=10 + i) for i in range(3)]
     fleet = SimFleet(boats, autopilot=READY)
     with station(fleet) as ground:
@@ -82,34 +81,9 @@ def test_boats_that_cannot_be_are_refused(boats, match):
         SimFleet(boats)
 
 
-def test_any_bytes_are_survived():
-    random = np.random.default_rng(1)
-    fleet = alone()
-    host, port = fleet.addresses["b"].removeprefix("udpout:").split(":")
-    good = bytes(
-        mavlink.MAVLink_command_long_message(1, 1, 176, 0, 1, 4, 0, 0, 0, 0, 0).pack(mavlink.MAVLink(None, 255))
-    )
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as hostile:
-        for k in range(1000):
-            data = bytearray(good) if k % 2 else bytearray(random.bytes(int(random.integers(1, 300))))
-            data[random.integers(len(data))] ^= 1 << int(random.integers(8))
-            hostile.sendto(bytes(data), (host, int(port)))
-            if k % 50 == 0:
-                fleet.advance(0.1)
-    with station(fleet) as ground:
-        counts = fleet.boats["b"].autopilot.counts
-        assert counts["taken"] < 3  # a checksum of 16 bits lets hardly any through
-        assert not fleet.boats["b"].is_held
-        ground.guide(1)
-        ground.run(3.0, lambda: ground.steer(1, 1.0, 0.5))
-        assert fleet.states()["b"][L.SPEED] > 0.3
-
-
 def test_the_same_seed_gives_the_same_sensors():
     def seen(seed):
-        with alone(noise=1.0, seed=seed, radio=RadioSettings(loss=0.3)) as _:
-            pass
-        fleet = alone(noise=1.0, seed=seed)
+        fleet = alone(noise=1.0, seed=seed, radio=RadioSettings(loss=0.3))
         fleet.advance(5.0)
         fleet.close()
         return fleet.boats["b"].seen
@@ -132,6 +106,14 @@ def test_lives_by_its_clock_in_a_thread():
     assert wall_s >= 0.9
     assert fleet.cpu_s > 0.0
     fleet.close()  # again
+
+
+def test_boats_far_behind_their_clock_let_the_time_go():
+    clock = ManualClock(0.0)
+    with alone(clock=clock) as fleet:
+        clock.sleep_until(10.0)
+        wait_for(lambda: fleet.let_go_s > 8.0)
+        assert fleet.time_s < 2.0
 
 
 def times(places):
@@ -226,3 +208,56 @@ def test_faults_that_do_not_exist_are_refused(boat, kind, options, match):
             fleet.fault(boat, kind, **options)
     finally:
         fleet.close()
+
+
+def test_a_fleet_from_its_file_with_a_key_boats_of_nobody_and_boats_beside(tmp_path):
+    link = '{kind: mavlink, address: "udpout:127.0.0.1:%d", system_id: %d}'
+    ports, key = free_ports(2), tmp_path / "boats.key"
+    key.write_text("ab" * 32)
+    key.chmod(0o600)
+    text = demo_file(tmp_path).read_text() + f"signing: {{key_file: {key}}}\n"
+    text = text.replace(
+        "red_1, agent: agent_3, platform: heron, contact: feed}",
+        f"red_1, agent: agent_3, platform: heron, commanded: false, link: {link % (ports[0], 11)}}}",
+    )
+    beside = f"  - {{name: safety, platform: heron, commanded: false, link: {link % (ports[1], 12)}}}"
+    text = text.replace("feed: {listen", f"{beside}\nfeed: {{listen")
+    fleet = SimFleet.from_file(parse_fleet(text), opponents="rammer")
+    try:
+        assert list(fleet.addresses) == ["blue_1", "blue_2", "blue_3", "red_1", "safety"]
+        assert fleet.system_ids["blue_3"] == 3
+        policies = {name: boat.spec.policy for name, boat in fleet.boats.items()}
+        assert policies == dict.fromkeys(fleet.boats, "") | dict.fromkeys(("red_1", "red_2", "red_3"), "rammer")
+        assert fleet.boats["blue_1"].autopilot._codec.signs
+        assert fleet.frame == parse_fleet(text).frame
+        assert tuple(fleet.states()["safety"][:2]) == (33.0, -3.0)
+        fleet.advance(1.0)
+    finally:
+        fleet.close()
+
+
+def test_runs_and_writes_figures_and_record(tmp_path):
+    figures, record = tmp_path / "run.json", tmp_path / "truth.npz"
+    options = ["--no-wait", "--duration", "4", "--speed", "20", "--wind", "5@270", "--noise", "1", "--loss", "0.1"]
+    faults = ["--fault", "blue_1:restart@1", "--fault", "red_1:jump@1+2,distance_m=10"]
+    files = ["--record", str(record), "--json", str(figures)]
+    result = CliRunner().invoke(app, ["sim-boats", str(demo_file(tmp_path)), *options, *faults, *files])
+    assert result.exit_code == 0, result.output
+    content = json.loads(figures.read_text())
+    assert undocumented(content, KEYS["sim-boats"]) == []
+    assert content["simulated_s"] >= 4.0
+    assert content["played"]
+    assert len(content["closest"]) == 15
+    assert len(load(record)["wanted"]) >= 35
+    assert "blue_1: restart" in result.output
+    assert "driven by" in result.output
+
+
+def test_planned_faults_are_read():
+    assert parse_incident("blue_1:jump@60+10,distance_m=5,course_deg=0") == Incident(
+        "blue_1", "jump", 60.0, 10.0, {"distance_m": 5, "course_deg": 0}
+    )
+    assert parse_incident("b:late@2").lasts_s == float("inf")
+    for wrong in ("jump@60", "b:jump", "b:jump@x", "b:jump@1,a=x y", "b:jump@1.2.3", ""):
+        with pytest.raises(ConfigError):
+            parse_incident(wrong)

@@ -1,6 +1,5 @@
 import math
 import socket
-import threading
 
 import numpy as np
 import pytest
@@ -10,6 +9,8 @@ from steerclear.env.mctf import MctfEnv
 from steerclear.env.record import load, save
 from steerclear.experiments.sim_boats import SimBoat, SimFleet
 from steerclear.experiments.sim_boats.game import start_places
+from steerclear.experiments.sim_boats.hull import STEP_S
+from steerclear.experiments.sim_boats.world import Mark, circumstances, last_commanded
 from steerclear.shield.bridge.feed_packets import parse_packet
 from steerclear.shield.bridge.frame import FieldFrame
 from steerclear.shield.platforms import layout as L
@@ -83,20 +84,15 @@ def test_the_record_is_a_games_and_the_oracle_judges_it(tmp_path):
         fleet.close()
 
 
-def test_start_places_are_the_games_or_drawn_apart():
+def test_start_places_are_their_own_the_games_or_drawn_apart():
     boats = [SimBoat(f"b{i}", team=i // 3) for i in range(6)]
-    fixed = start_places(boats, None, None)
+    fixed, drawn = start_places(boats, None, None), start_places(boats, None, 4)
     assert fixed[0][:2] == (25.0, 30.0)
     assert {place[0] for place in fixed} == {25.0, 55.0}
-    drawn = start_places(boats, None, 4)
-    assert drawn != fixed
-    assert drawn == start_places(boats, None, 4)
-    apart = [math.dist(a[:2], b[:2]) for i, a in enumerate(drawn) for b in drawn[:i]]
-    assert min(apart) >= 40.0 / 6.0
-    own = [SimBoat("a", start=(1.0, 2.0, 3.0)), SimBoat("b")]
-    placed = start_places(own, None, None)
-    assert placed[0] == (1.0, 2.0, 3.0)
-    assert placed[1] == pytest.approx((25.0, 40.0 / 3.0, 90.0))
+    assert drawn == start_places(boats, None, 4) != fixed
+    assert min(math.dist(a[:2], b[:2]) for i, a in enumerate(drawn) for b in drawn[:i]) >= 40.0 / 6.0
+    own, placed = start_places([SimBoat("a", start=(1.0, 2.0, 3.0)), SimBoat("b")], None, None)
+    assert (own, placed) == ((1.0, 2.0, 3.0), pytest.approx((25.0, 40.0 / 3.0, 90.0)))
 
 
 @pytest.fixture
@@ -112,30 +108,20 @@ def packets(listener, count):
     return [parse_packet(listener.recv(65536)) for _ in range(count)]
 
 
-def test_the_feed_says_where_all_boats_are(listener):
+def test_the_feed_says_where_all_boats_are_and_faults_reach_it(listener):
     frame = FieldFrame(42.0, -71.0, 30.0)
     fleet = six(feed_to=[f"127.0.0.1:{listener.getsockname()[1]}"], y_axis_deg=30.0)
     try:
-        fleet.advance(3.0)
-        told = packets(listener, 30)
-        assert [packet.seq for packet in told] == list(range(told[0].seq, told[0].seq + 30))
-        fixes = {fix.boat: fix for fix in told[-1].fixes}
-        assert set(fixes) == set(fleet.boats)
+        fleet.advance(2.0)
+        told = packets(listener, 20)
+        assert [packet.seq for packet in told] == list(range(told[0].seq, told[0].seq + 20))
+        before = {fix.boat: fix for fix in told[-1].fixes}
+        assert set(before) == set(fleet.boats)
         for name, state in fleet.states().items():
-            fix = fixes[name]
+            fix = before[name]
             assert frame.to_field_m(fix.latitude_deg, fix.longitude_deg) == pytest.approx(state[:2], abs=1e-6)
             assert fix.heading_deg == pytest.approx((state[L.HEADING] + 30.0) % 360.0)
-            assert fix.speed_mps == pytest.approx(state[L.SPEED])
-            assert fix.age_s == 0.0
-    finally:
-        fleet.close()
-
-
-def test_faults_reach_the_feed(listener):
-    fleet = six(feed_to=[f"127.0.0.1:{listener.getsockname()[1]}"])
-    try:
-        fleet.advance(2.0)
-        before = {fix.boat: fix for fix in packets(listener, 20)[-1].fixes}
+            assert (fix.speed_mps, fix.age_s) == (pytest.approx(state[L.SPEED]), 0.0)
         fleet.fault("red_0", "telemetry_stop")
         fleet.fault("red_1", "freeze")
         fleet.fault("red_2", "late", delay_s=1.0)
@@ -155,25 +141,6 @@ def test_faults_reach_the_feed(listener):
         fleet.close()
 
 
-def test_states_are_of_one_moment_while_the_thread_runs():
-    stop = threading.Event()
-    torn = []
-    with six(speed=20.0) as fleet:
-
-        def look():
-            while not stop.is_set():
-                fleet.states()
-                fleet.closest_approaches()
-                torn.append(fleet.time_s)
-
-        looker = threading.Thread(target=look)
-        looker.start()
-        stop.wait(0.5)
-        stop.set()
-        looker.join()
-    assert torn == sorted(torn)
-
-
 def test_a_policys_boat_with_a_link_tells_where_it_is_and_obeys_who_commands_it():
     boats = [SimBoat("blue", policy="medium_attack"), SimBoat("red", team=1, policy="medium_attack")]
     fleet = SimFleet(boats, autopilot=READY, waits=False)
@@ -185,3 +152,50 @@ def test_a_policys_boat_with_a_link_tells_where_it_is_and_obeys_who_commands_it(
         assert math.dist(told[0][1:], told[-1][1:]) > 1.0  # its policy drives it while nobody commands
         ground.run(12.0, lambda: ground.steer(2, 0.0, 0.5))
         assert fleet.states()["red"][L.HEADING] == pytest.approx(0.0, abs=5.0)
+
+
+STEERED = Mark(True, (), True)
+ALONE = Mark(False, ("link_loss",))
+PLAYED = Mark(True)
+LEFT = Mark(False, held=True)
+
+
+def held_by(rows, step, boats):
+    return circumstances(rows, last_commanded(rows), step, boats)
+
+
+def test_how_long_a_boat_was_steered_by_nobody_is_told():
+    rows = [*[(STEERED, PLAYED)] * 3, *[(ALONE, PLAYED)] * 4, (STEERED, PLAYED)]
+    assert held_by(rows, 7, (0, 1)) == {"unsteered_s": [0.4, 0.0], "faults": ["link_loss"], "after_run": False}
+    assert held_by(rows, 3, (0, 1)) == {"unsteered_s": [0.0, 0.0], "faults": [], "after_run": False}
+
+
+@pytest.mark.parametrize(
+    ("gap_s", "then", "in_order"),
+    [
+        (0.0, LEFT, True),
+        (1.5, LEFT, True),  # its commands timed out while HOLD was asked for
+        (3.5, LEFT, False),  # its own failsafe
+        (0.0, Mark(False), False),  # GUIDED, and nobody there
+    ],
+)
+def test_a_runner_that_dies_does_not_end_the_run(gap_s, then, in_order):
+    gap = round(gap_s / STEP_S)
+    rows = [*[(STEERED, PLAYED, STEERED)] * 5, *[(Mark(False), PLAYED, LEFT)] * gap, *[(then, PLAYED, LEFT)] * 5]
+    assert held_by(rows, len(rows), (0, 1))["after_run"] == in_order
+    assert held_by(rows, len(rows), (2, 1))["after_run"], "the other was left in order"
+    assert held_by(rows, len(rows), (2, 0))["after_run"] == in_order
+
+
+def test_breaches_of_a_simulated_game_carry_them():
+    boats = [SimBoat(f"b{i}", team=i // 2, start=(10.0 + i, 10.0, 0.0), policy="hold") for i in range(4)]
+    fleet = SimFleet(boats, autopilot=READY, record=True, waits=False)
+    fleet.fault("b0", "freeze", duration_s=1.0)
+    fleet.advance(1.0)
+    breaches, commanded = fleet.judge(0), fleet.truth_record()["commanded"]
+    fleet.close()
+    assert breaches
+    assert commanded.shape[1] == 4
+    assert not commanded.any()
+    assert all(breach["unsteered_s"] == [0.0, 0.0] and not breach["after_run"] for breach in breaches)
+    assert any(breach["faults"] == ["freeze"] for breach in breaches)

@@ -1,51 +1,94 @@
-"""A log is held against itself before it is fitted: what contradicts the rest is cut out and told, or refused."""
+"""Logs of every kind become the same runs; what contradicts the rest is cut out, what says too little is refused."""
 
 import math
 import re
 import struct
 
-import fit_logs
 import numpy as np
 import pytest
-from fit_logs import FORMATS, WRITERS, as_alog, as_csv, degrees_of, messages_of
+from fit_logs import WRITERS, as_alog, as_bin, as_csv, as_tlog, drive
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from steerclear.experiments.fit.reading import read_logs
 from steerclear.experiments.fit.runs import FitError
 
+
+@pytest.mark.parametrize("ending", sorted(WRITERS))
+def test_a_log_of_any_kind_gives_the_runs_that_were_driven(ending, tmp_path):
+    rows = drive()
+    paths = [tmp_path / f"{k}.{ending}" for k in range(3)]
+    for path in paths:
+        WRITERS[ending](path, rows)
+    runs = read_logs(paths)
+    assert len(runs) == 3
+    for run in runs:
+        assert run.seconds == pytest.approx(36.0, abs=0.5)
+        k = np.arange(0, len(run.seen) - 5, 10)
+        seen, driven = run.seen[k], rows[k]
+        shift = seen[0, :2] - driven[0, 1:3]  # places from the log's own origin
+        assert np.abs(seen[:, :2] - shift - driven[:, 1:3]).max() < 0.3
+        assert np.abs((seen[:, 2] - driven[:, 3] + 180.0) % 360.0 - 180.0).max() < 12.0  # a row early or late
+        assert np.abs(run.told[k, 0] - driven[:, 5]).mean() < 0.06
+
+
+def test_of_a_log_with_several_boats_one_is_named(tmp_path):
+    as_tlog(tmp_path / "two.tlog", drive(20.0), systems=(1, 4))
+    with pytest.raises(FitError, match=r"tells of boats 1, 4; name one with --system-id"):
+        read_logs([tmp_path / "two.tlog"])
+    with pytest.raises(FitError, match="nothing of boat 9; it has 1, 4"):
+        read_logs([tmp_path / "two.tlog"], system_id=9)
+
+
+def still(path):
+    as_csv(path, np.column_stack([np.arange(0.0, 60.0, 0.1), *np.zeros((6, 600))]))
+
+
+BAD = {
+    "no column": ("a.csv", lambda p: p.write_text("t_s,x_m\n0,1\n"), r"no column for y \(north\); name one y_m or"),
+    "no number": ("a.csv", lambda p: as_csv(p, []), "has no rows"),
+    "a word": (
+        "a.csv",
+        lambda p: p.write_text("t_s,x_m,y_m,heading_deg,speed_mps,cmd_speed,cmd_heading_deg\n0,1,2,3,fast,5,6\n"),
+        "line 2: a value is missing or no number",
+    ),
+    "empty": ("a.csv", lambda p: p.write_text(""), "is empty"),
+    "bytes": ("a.csv", lambda p: p.write_bytes(b"\xff\xfe\x00\x01"), "is no CSV"),
+    "another ending": ("a.txt", lambda p: p.write_text("x"), "is no log that can be read; give .csv"),
+    "knots": (
+        "a.csv",
+        lambda p: as_csv(p, drive() * np.array([1, 1, 1, 1, 40, 1, 1])),
+        "a speed of .* m/s is no boat's; give speeds in m/s",
+    ),
+    "no motion": ("a.csv", still, "fewer than 3|too little motion"),
+    "MOOS without commands": (
+        "a.alog",
+        lambda p: p.write_text("".join(f"{k} NAV_X s 1\n{k} NAV_Y s 1\n" for k in range(9))),
+        r"tells no headings \(NAV_HEADING\), no speeds .*give a log in which the boat was commanded",
+    ),
+    "ArduPilot without nav tuning": (
+        "a.bin",
+        lambda p: as_bin(p, drive(10.0), ("NTUN",)),
+        r"tells no headings commanded \(NTUN.DesYaw\)",
+    ),
+    "no MAVLink": ("a.tlog", lambda p: p.write_bytes(b"nothing of the kind" * 50), "tells no positions|cannot be read"),
+    "no log there": ("b.csv", lambda p: None, "there is no log"),
+}
+
+
+@pytest.mark.parametrize("case", sorted(BAD))
+def test_what_cannot_be_fitted_is_refused_in_one_line(case, tmp_path):
+    name, write, words = BAD[case]
+    write(tmp_path / name)
+    with pytest.raises(FitError, match=words) as error:
+        read_logs([tmp_path / name])
+    assert "\n" not in str(error.value)
+
+
 LEGS = [(2.0, 0.0), (2.0, 90.0), (0.0, 90.0), (2.0, 20.0), (1.0, 20.0), (2.0, -60.0), (0.0, -60.0), (2.0, 30.0)]
 
 
-def drive(legs=LEGS):
-    """Rows (time, x, y, heading, speed, told speed, told heading) of a boat that obeys 0.3 s late, from rest."""
-    return fit_logs.drive(100.0, legs, delay_steps=3, begin_mps=0.0)
-
-
-def as_tlog(path, rows, every=1, top=lambda t: 3.0, before_fix=0, component=None):
-    """A telemetry log: commands each row, positions every so many; first some positions without a fix."""
-    boat, ground = mavlink.MAVLink(None, 1, 1), mavlink.MAVLink(None, 255, 190)
-    with path.open("wb") as file:
-
-        def put(sender, message, time_s):
-            file.write(struct.pack(">Q", round(1e6 * (1.7e9 + time_s))) + bytes(message.pack(sender)))
-
-        for k in range(before_fix):
-            put(
-                boat, mavlink.MAVLink_global_position_int_message(0, 0, 0, 0, 0, 0, 0, 0, 0), k / 5.0 - before_fix / 5.0
-            )
-        told = None
-        for k, row in enumerate(rows):
-            _, attitude, place, command = messages_of(row, 1)
-            if top(row[0]) != told:
-                told = top(row[0])
-                put(boat, mavlink.MAVLink_param_value_message(b"WP_SPEED", told, 9, 1, 0), row[0])
-            command.thrust = row[5] / told
-            put(ground, command, row[0])
-            if k % every == 0:
-                put(boat, attitude, row[0])
-                put(boat, place, row[0])
-                if component is not None:
-                    put(mavlink.MAVLink(None, 1, component), mavlink.MAVLink_global_position_int_message(
-                        0, 100, 100, 0, 0, 0, 0, 0, 0), row[0])  # fmt: skip
+def long_drive(legs=LEGS):
+    """Rows of a boat that obeys 0.3 s late, from rest."""
+    return drive(100.0, legs, delay_steps=3, begin_mps=0.0)
 
 
 def read(path, rows, write, **more):
@@ -56,7 +99,7 @@ def read(path, rows, write, **more):
 
 
 def test_positions_before_a_fix_are_left_out(tmp_path):
-    rows = drive()
+    rows = long_drive()
     plain, _ = read(tmp_path / "a.tlog", rows, as_tlog)
     late, _ = read(tmp_path / "b.tlog", rows, as_tlog, before_fix=40)
     ways = [sum(float(np.hypot(*np.diff(run.seen[:, :2], axis=0).T).sum()) for run in runs) for runs in (plain, late)]
@@ -64,42 +107,27 @@ def test_positions_before_a_fix_are_left_out(tmp_path):
 
 
 def test_another_component_of_the_boat_does_not_move_it(tmp_path):
-    rows = drive()
+    rows = long_drive()
     plain, _ = read(tmp_path / "a.tlog", rows, as_tlog)
     mixed, said = read(tmp_path / "b.tlog", rows, as_tlog, component=191)
     assert not said
     assert np.allclose(plain[0].seen, mixed[0].seen)
 
 
-@pytest.mark.parametrize("first_has_fix", [True, False])
-def test_speeds_are_those_of_a_receiver_with_a_fix(first_has_fix, tmp_path):
-    rows, path = drive(), tmp_path / "a.bin"
-    forms = {**FORMATS, "GPS": (132, "QBBf", "TimeUS,I,Status,Spd")}
-    with path.open("wb") as file:
-        for name, (number, letters, columns) in forms.items():
-            size = 3 + {"FMT": 86, "POS": 16, "GPS": 14}.get(name, 12)
-            texts = name.encode(), letters.encode(), columns.encode()
-            file.write(b"\xa3\x95\x80" + struct.pack("<BB4s16s64s", number, size, *texts))
-        for time_s, x, y, heading, speed, told_speed, told_heading in rows:
-            stamp, place = round(1e6 * (time_s + 100.0)), [round(1e7 * value) for value in degrees_of(x, y)]
-            file.write(b"\xa3\x95" + bytes([130]) + struct.pack("<Qii", stamp, *place))
-            for k, value in ((131, heading % 360.0), (133, told_speed), (134, told_heading % 360.0)):
-                file.write(b"\xa3\x95" + bytes([k]) + struct.pack("<Qf", stamp, value))
-            for receiver in (0, 1):
-                fixed = (receiver == 0) == first_has_fix
-                values = (receiver, 4 if fixed else 1, speed if fixed else 0.0)
-                file.write(b"\xa3\x95" + bytes([132]) + struct.pack("<QBBf", stamp, *values))
-    runs = read_logs([path])
+@pytest.mark.parametrize("receivers", [(True, False), (False, True)])
+def test_speeds_are_those_of_a_receiver_with_a_fix(receivers, tmp_path):
+    rows = long_drive()
+    runs, _ = read(tmp_path / "a.bin", rows, as_bin, receivers=receivers)
     assert max(run.seen[:, 3].max() for run in runs) == pytest.approx(rows[:, 4].max(), abs=0.05)
 
 
 def test_a_share_of_top_speed_is_of_the_parameter_that_held_then(tmp_path):
-    runs, _ = read(tmp_path / "a.tlog", drive(), as_tlog, top=lambda t: 2.0 if t < 50.0 else 4.0)
+    runs, _ = read(tmp_path / "a.tlog", long_drive(), as_tlog, top=lambda t: 2.0 if t < 50.0 else 4.0)
     assert max(run.told[:, 0].max() for run in runs) == pytest.approx(2.0, abs=1e-3)
 
 
 def test_where_the_first_parameter_is_zero_the_cruise_speed_counts(tmp_path):
-    rows, path = drive(), tmp_path / "a.tlog"
+    rows, path = long_drive(), tmp_path / "a.tlog"
     as_tlog(path, rows)
     cruise = mavlink.MAVLink_param_value_message(b"CRUISE_SPEED", 3.0, 9, 1, 0).pack(mavlink.MAVLink(None, 1, 1))
     none = mavlink.MAVLink_param_value_message(b"WP_SPEED", 0.0, 9, 1, 0).pack(mavlink.MAVLink(None, 1, 1))
@@ -114,7 +142,7 @@ def test_where_the_first_parameter_is_zero_the_cruise_speed_counts(tmp_path):
 
 @pytest.mark.parametrize("every", [1, 5, 9])
 def test_commands_keep_their_own_times_whatever_the_rate_of_positions(every, tmp_path):
-    rows = drive()
+    rows = long_drive()
     runs, _ = read(tmp_path / "a.tlog", rows, as_tlog, every=every)
     held = {run.begin_s % 1.7e9: run.told for run in runs}
 
@@ -132,9 +160,9 @@ def test_commands_keep_their_own_times_whatever_the_rate_of_positions(every, tmp
 
 def test_rows_too_seldom_to_tell_a_delay_are_refused(tmp_path):
     with pytest.raises(FitError, match=r"come every 0.5 s, from which no delay can be told; log them at least every"):
-        read(tmp_path / "a.csv", drive()[::5], as_csv)
+        read(tmp_path / "a.csv", long_drive()[::5], as_csv)
     with pytest.raises(FitError, match=r"positions come every 1.5 s"):
-        read(tmp_path / "a.tlog", drive(), as_tlog, every=15)
+        read(tmp_path / "a.tlog", long_drive(), as_tlog, every=15)
 
 
 UNITS = {"knots": 1.94384, "km/h": 3.6, "mph": 2.23694, "cm/s": 20.0}
@@ -143,7 +171,7 @@ UNITS = {"knots": 1.94384, "km/h": 3.6, "mph": 2.23694, "cm/s": 20.0}
 @pytest.mark.parametrize("unit", sorted(UNITS))
 @pytest.mark.parametrize("ending", ["csv", "alog"])
 def test_speeds_in_another_unit_than_the_positions_are_refused(unit, ending, tmp_path):
-    rows = drive(legs=[(speed / 2.0, heading) for speed, heading in LEGS])
+    rows = long_drive(legs=[(speed / 2.0, heading) for speed, heading in LEGS])
     rows[:, 4] *= UNITS[unit]
     words = "is no boat's|by its speeds the boat went" if unit == "cm/s" else f"they look like {unit}"
     with pytest.raises(FitError, match=words):
@@ -180,7 +208,7 @@ def broken(rows, case):
     ],
 )
 def test_what_contradicts_the_rest_is_cut_out_and_told(case, words, tmp_path):
-    rows = np.concatenate([drive(), drive() + np.array([100.0, 0, 0, 0, 0, 0, 0])])
+    rows = np.concatenate([long_drive(), long_drive() + np.array([100.0, 0, 0, 0, 0, 0, 0])])
     rows[1000:, 1:3] += rows[999, 1:3] - rows[1000, 1:3]
     runs, said = read(tmp_path / "a.csv", broken(rows, case), as_csv)
     assert len(said) >= 1
@@ -194,11 +222,11 @@ def test_what_contradicts_the_rest_is_cut_out_and_told(case, words, tmp_path):
 def test_headings_that_are_not_the_course_are_refused(case, tmp_path):
     words = r"headings are .* deg off the course .*give headings in degrees clockwise|, 2 deg turned"
     with pytest.raises(FitError, match=words):
-        read(tmp_path / "a.csv", broken(drive(), case), as_csv)
+        read(tmp_path / "a.csv", broken(long_drive(), case), as_csv)
 
 
 def test_a_heading_that_is_not_known_is_no_heading(tmp_path):
-    rows = drive()
+    rows = long_drive()
     rows[200:240, 3] = 655.35
     runs, _ = read(tmp_path / "a.csv", rows, as_csv)
     assert len(runs) >= 2
@@ -215,17 +243,17 @@ def test_a_heading_that_is_not_known_is_no_heading(tmp_path):
 )
 def test_a_boat_whose_stop_was_never_seen_is_refused(legs, words, tmp_path):
     with pytest.raises(FitError, match=words):
-        read(tmp_path / "a.csv", drive(legs=legs), as_csv)
+        read(tmp_path / "a.csv", long_drive(legs=legs), as_csv)
 
 
 def test_a_boat_that_was_never_seen_to_start_is_refused(tmp_path):
-    rows = drive(legs=[(2.0, 0.0), (2.0, 90.0), *[(0.0, 90.0)] * 15])
+    rows = long_drive(legs=[(2.0, 0.0), (2.0, 90.0), *[(0.0, 90.0)] * 15])
     with pytest.raises(FitError, match="never seen told to go and gain speed"):
         read(tmp_path / "a.csv", rows[40:], as_csv)
 
 
 def test_files_as_other_programs_write_them_are_read(tmp_path):
-    rows = drive()
+    rows = long_drive()
     plain, _ = read(tmp_path / "plain.csv", rows, as_csv)
     text = (tmp_path / "plain.csv").read_text()
     (tmp_path / "bom.csv").write_bytes(b"\xef\xbb\xbf" + text.replace("\n", "\r\n").encode() + b"\r\n,,,,,,\r\n\r\n")
