@@ -141,18 +141,17 @@ def judge(replay: Replay) -> None:
 
 def as_content(replay: Replay) -> dict[str, Any]:
     """The report as JSON-ready content, see `keys.REPLAY`."""
-    proof, chain = replay.proof, replay.chain
-    counts = asdict(proof)
-    del counts["covered"]
-    content: dict[str, Any] = {
-        **{name: getattr(replay, name) for name in ("began", "seconds", "complete", "made_by", "proved", "damage")},
+    proof = replay.proof
+    told = ("began", "seconds", "complete", "made_by", "proved", "damage", "origin")
+    chain = ("chained", "keyed", "codes_checked", "broken", "breaks")
+    return {
+        **{name: getattr(replay, name) for name in told},
         "policy": replay.header.policy,
-        "origin": replay.origin,
-        "chain": {
-            **{name: getattr(chain, name) for name in ("chained", "keyed", "codes_checked", "broken", "breaks")},
-        },
-        **counts,
-        "missing": [list(stretch) for stretch in counts["missing"]],
+        "chain": {name: getattr(replay.chain, name) for name in chain},
+        **{name: count for name, count in asdict(proof).items() if name not in ("covered", "first")},
+        "missing": [list(stretch) for stretch in proof.missing],
+        "first_difference": proof.first and proof.first._asdict(),
+        "first_sent": proof.first_sent and proof.first_sent._asdict(),
         "cut": [{"boat": boat, "limit_mps": limit, "commands": count} for (boat, limit), count in proof.cut.items()],
         "reasons": dict(replay.reasons),
         "actions": [
@@ -161,10 +160,6 @@ def as_content(replay: Replay) -> dict[str, Any]:
         ],
         **replay.judged,
     }
-    del content["first"]
-    content["first_difference"] = proof.first and proof.first._asdict()
-    content["first_sent"] = proof.first_sent and proof.first_sent._asdict()
-    return content
 
 
 def show(console: Console, replay: Replay) -> None:

@@ -1,7 +1,9 @@
 """Runs on boats: checks, a black box, and steering; boats are always left stopped.
 
 `deploy` lets a policy play, `preflight` checks and drills, and `sea_trial` drives the manoeuvres that models are fitted
-to. All three call `run_boats` with different drivers.
+to. All three call `run_boats` with different drivers. They raise `FleetFileError` before anything is opened if the file
+cannot be used, and `BridgeError` if a port is taken, or a boat does not answer or refuses: boats connected by then are
+left stopped.
 """
 
 from __future__ import annotations
@@ -127,7 +129,6 @@ def run_boats(
 
     Raises:
         ConfigError: a name to accept is not a check.
-        BridgeError: a port is taken, or a boat does not answer or refuses; boats connected by then are left stopped.
     """
     orders, fleet, outcome = run.orders, run.fleet, run.outcome
     session = VehicleSession(fleet, orders.boat, run.clock, tlog=orders.tlog, begun_unix_s=orders.begun_unix_s)
@@ -191,9 +192,7 @@ def deploy(orders: Orders, surface: Surface | None = None, operator: Operator | 
         The outcome; ``refused`` is not empty if checks prevented the start.
 
     Raises:
-        FleetFileError: the file cannot be used; nothing was opened.
         PolicyError: the policy does not exist or does not start; nothing was opened.
-        BridgeError: a port is taken, or a boat does not answer or refuses; boats connected by then are left stopped.
     """
     run = Run.of(orders, surface, operator)
     fleet = run.fleet
@@ -239,11 +238,7 @@ def preflight(
 ) -> Outcome:
     """Run all checks, then the drill, which moves boats, if they allow it; boats are left stopped.
 
-    The results are stored if a drill was requested. The orders' policy is not used.
-
-    Raises:
-        FleetFileError: the file cannot be used; nothing was opened.
-        BridgeError: a port is taken, a boat does not answer or refuses, or the result cannot be stored.
+    The results are stored if a drill was requested; `BridgeError` if they cannot be. The orders' policy is not used.
     """
     run = Run.of(orders, surface, operator)
     warm_up(run.fleet)
@@ -283,10 +278,6 @@ def sea_trial(
     ``only`` names the one boat to drive; None: all of the process, one after the other. ``speed_mps`` is the highest
     commanded speed; None: top speed. ``tell`` is called with each manoeuvre that begins. The orders' policy is not
     used.
-
-    Raises:
-        FleetFileError: the file cannot be used, or has no such boat; nothing was opened.
-        BridgeError: a port is taken, or a boat does not answer or refuses.
     """
     run = Run.of(orders, surface, operator)
     names = tuple(entry.name for entry in run.fleet.commanded(orders.boat))

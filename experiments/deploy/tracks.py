@@ -74,13 +74,13 @@ class Tracks:
 
     def marked(self, key: str) -> NDArray[np.bool_]:
         """Return (T, n): whether the referee's game state set this flag of a boat, such as "driven"."""
-        return np.array([[_status(game, name, key) for name in self.names] for game in self.games])
+        boats = [_mapping(game.get("boats")) for game in self.games]
+        return np.array([[bool(_mapping(row.get(name)).get(key)) for name in self.names] for row in boats])
 
 
-def _status(game: Mapping[str, Any], name: str, key: str) -> bool:
-    boats = game.get("boats")
-    boat = boats.get(name) if isinstance(boats, Mapping) else None
-    return isinstance(boat, Mapping) and bool(boat.get(key))
+def _mapping(value: Any) -> Mapping[str, Any]:
+    """Return the value, or nothing where a log has another one."""
+    return value if isinstance(value, Mapping) else {}
 
 
 class TrackBuilder:

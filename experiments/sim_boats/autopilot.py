@@ -15,7 +15,7 @@ from steerclear.shield.bridge.mavlink.connection import Codec
 from steerclear.shield.bridge.mavlink.signing import Signing
 
 from .hull import Steer, Turn
-from .sensing import Snapshot
+from .sensing import Radio, Snapshot
 from .settings import AutopilotSettings
 from .vehicle import CAN_SEND, PARAMETERS, Streams, Telemetry, Vehicle
 
@@ -38,7 +38,7 @@ class Autopilot:
         settings: how it behaves.
         frame: where the field is.
         snapshot: its state at the start.
-        write: takes each outgoing packet.
+        down: radio to the commander.
         key: signing key of 32 bytes; None: packets are not signed and any is accepted.
 
     Attributes:
@@ -59,14 +59,14 @@ class Autopilot:
         settings: AutopilotSettings,
         frame: FieldFrame,
         snapshot: Snapshot,
-        write: Callable[[bytes], None],
+        down: Radio,
         key: bytes | None = None,
     ) -> None:
         self.system_id, self.frame, self.snapshot = system_id, frame, snapshot
         self.vehicle = Vehicle(settings)
         self.vehicle.set_parameter("SYSID_THISMAV", system_id)
         self.counts = {"taken": 0, "refused": 0, "ignored": 0}
-        self._write, self._signing = write, None if key is None else Signing(key)
+        self._down, self._signing = down, None if key is None else Signing(key)
         self.boot(snapshot.time_s)
 
     def boot(self, now_s: float) -> None:
@@ -102,7 +102,7 @@ class Autopilot:
         handler(self, message)
 
     def _send(self, message: Any) -> None:
-        self._write(self._codec.encode(message))
+        self._down.put(self._codec.encode(message), self.now_s)
 
     def _send_now(self, message: int) -> int:
         """Send one of the known messages, outside its interval; the result to acknowledge."""
@@ -132,7 +132,7 @@ class Autopilot:
 
     def _on_heartbeat(self, message: Any) -> None:
         if message.get_srcSystem() == int(self.vehicle.parameters["SYSID_MYGCS"]):
-            self.vehicle.hear_ground(self.now_s)
+            self.vehicle.ground_s = self.now_s
 
     def _on_time(self, message: Any) -> None:
         if message.tc1 == 0:

@@ -68,7 +68,7 @@ class Boat:
         self.seen = self._sensors.sense(self.hull, 0.0)
         top = dict.fromkeys(("WP_SPEED", "CRUISE_SPEED"), platform.max_speed_mps)  # unless it is told otherwise
         settings = replace(setting.autopilot, parameters={**top, **setting.autopilot.parameters})
-        self.autopilot = Autopilot(system_id, settings, frame, self.seen, self._transmit, setting.key)
+        self.autopilot = Autopilot(system_id, settings, frame, self.seen, self.down, setting.key)
         self.faults = Faults(self.autopilot, self.down, self.up, frame, seeds[3])
         self.community: Community | None = None
         if spec.address is not None and spec.address.startswith(MOOS):
@@ -127,6 +127,3 @@ class Boat:
     def _deliver(self, now_s: float) -> None:
         for packet in self.down.take(now_s):
             self.write(packet)
-
-    def _transmit(self, packet: bytes) -> None:
-        self.down.put(packet, self.autopilot.now_s)

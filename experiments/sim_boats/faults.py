@@ -118,11 +118,7 @@ class Faults:
 
 
 def check_kind(kind: str) -> None:
-    """Check that a fault kind exists.
-
-    Raises:
-        ConfigError: it does not.
-    """
+    """Raise `ConfigError` unless a fault kind exists."""
     if kind not in KINDS:
         near = difflib.get_close_matches(kind, KINDS, n=1)
         hint = f"did you mean {near[0]!r}?" if near else f"faults are {', '.join(KINDS)}"
@@ -284,7 +280,7 @@ class Plan:
     """Planned faults in order of time.
 
     Raises:
-        ConfigError: a boat is not simulated.
+        ConfigError: a boat is not simulated; from `look`, a fault has no such option.
     """
 
     def __init__(self, incidents: Iterable[Incident], fleet: SimFleet) -> None:
@@ -294,11 +290,7 @@ class Plan:
             fleet.boat(incident.boat)
 
     def look(self) -> list[Incident]:
-        """Start the faults that are due and return them.
-
-        Raises:
-            ConfigError: the fault has no such option.
-        """
+        """Start the faults that are due and return them."""
         begun = []
         while self._waiting and self._waiting[0].at_s <= self._fleet.time_s:
             incident = self._waiting.pop(0)

@@ -9,7 +9,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from multiprocessing.connection import wait
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -142,7 +141,8 @@ class SimFleet:
         cpu_s: processor time of the thread, s.
 
     Raises:
-        ConfigError: boats contradict each other, an address cannot be used, or a setting is out of range.
+        ConfigError: boats contradict each other, an address cannot be used, or a setting is out of range; and from
+            methods, if there is no such boat, fault or option, nothing was recorded, or the thread runs already.
     """
 
     def __init__(self, boats: Sequence[SimBoat], **settings: Any) -> None:
@@ -250,29 +250,17 @@ class SimFleet:
             return {name: boat.hull.state.copy() for name, boat in self.boats.items()}
 
     def place(self, boat: str, x_m: float, y_m: float, heading_deg: float, speed_mps: float = 0.0) -> None:
-        """Move a boat to a position, heading and speed, and reset its controllers.
-
-        Raises:
-            ConfigError: no such boat.
-        """
+        """Move a boat to a position, heading and speed, and reset its controllers."""
         with self._lock:
             self.boat(boat).hull.place(x_m, y_m, heading_deg, speed_mps)
 
     def fault(self, boat: str, kind: str, *, duration_s: float = float("inf"), **options: Any) -> None:
-        """Start a fault of a boat, see `faults.KINDS`; it ends after ``duration_s`` or with `clear`.
-
-        Raises:
-            ConfigError: no such boat, fault or option.
-        """
+        """Start a fault of a boat, see `faults.KINDS`; it ends after ``duration_s`` or with `clear`."""
         with self._lock:
             self.boat(boat).faults.start(kind, self.time_s, duration_s, **options)
 
     def clear(self, boat: str, kind: str | None = None) -> None:
-        """End a fault of a boat, or all of them.
-
-        Raises:
-            ConfigError: no such boat.
-        """
+        """End a fault of a boat, or all of them."""
         with self._lock:
             self.boat(boat).faults.stop(kind)
 
@@ -282,29 +270,17 @@ class SimFleet:
             return self._world.closest.all()
 
     def truth_record(self) -> Record:
-        """Return the record of the game since it began, with the boats' full states as array ``state``.
-
-        Raises:
-            ConfigError: nothing was recorded.
-        """
+        """Return the record of the game since it began, with the boats' full states as array ``state``."""
         with self._lock:
             return record_of(self._world.truth).record()
 
     def judge(self, team: int = 0) -> list[dict[str, Any]]:
-        """Return a team's separation violations since the game began, with verdicts (`docs.KEYS`).
-
-        Raises:
-            ConfigError: nothing was recorded.
-        """
+        """Return a team's separation violations since the game began, with verdicts (`docs.KEYS`)."""
         with self._lock:
             return record_of(self._world.truth).judge(team)
 
     def advance(self, seconds: float) -> None:
-        """Simulate that many seconds at once, without thread and without waiting.
-
-        Raises:
-            ConfigError: the thread is running.
-        """
+        """Simulate that many seconds at once, without thread and without waiting."""
         if self.is_running:
             raise ConfigError("the fleet runs by itself; call advance only on one that was not started")
         for _ in range(round(seconds / TICK_S)):
@@ -312,11 +288,7 @@ class SimFleet:
             self._tick()
 
     def start(self) -> None:
-        """Start the thread.
-
-        Raises:
-            ConfigError: the thread is already running.
-        """
+        """Start the thread."""
         if self.is_running:
             raise ConfigError("the fleet runs already")
         self._world.warm_up()
@@ -341,17 +313,11 @@ class SimFleet:
         self.start()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def boat(self, name: str) -> Boat:
-        """Return the boat of that name.
-
-        Raises:
-            ConfigError: there is none.
-        """
+        """Return the boat of that name."""
         if name not in self.boats:
             raise ConfigError(f"no simulated boat is named {name!r}; there are {', '.join(self.boats)}")
         return self.boats[name]

@@ -1,4 +1,4 @@
-"""Settings of simulated boats: identity, autopilot, water and radio."""
+"""Settings of simulated boats: identity, autopilot, water and radio; `ConfigError` for a number out of range."""
 
 from __future__ import annotations
 
@@ -14,11 +14,7 @@ _MOST = 1e9
 
 
 def check_bounds(settings: object, **bounds: tuple[float, float]) -> None:
-    """Check that these attributes are numbers within their bounds.
-
-    Raises:
-        ConfigError: one of them is not.
-    """
+    """Raise `ConfigError` unless these attributes are numbers within their bounds."""
     for name, (low, high) in bounds.items():
         value = getattr(settings, name)
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
@@ -65,9 +61,6 @@ class AutopilotSettings:
         back_up_m: distance run astern after a time-out stop.
         top_rate_hz: highest rate of one message.
         parameters: autopilot parameters that differ from the defaults, by name.
-
-    Raises:
-        ConfigError: a number is out of range.
     """
 
     boot_s: float = 42.0
@@ -78,9 +71,8 @@ class AutopilotSettings:
     parameters: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        positive = {} if self.brake_mps2 is None else {"brake_mps2": (0.01, _MOST)}
-        check_bounds(self, boot_s=(0.0, _MOST), back_up_m=(0.0, _MOST), timeout_s=(0.01, _MOST), **positive)
-        check_bounds(self, top_rate_hz=(0.01, _MOST))
+        positive = ("timeout_s", "top_rate_hz", *(() if self.brake_mps2 is None else ("brake_mps2",)))
+        check_bounds(self, boot_s=(0.0, _MOST), back_up_m=(0.0, _MOST), **dict.fromkeys(positive, (0.01, _MOST)))
 
 
 @dataclass(frozen=True)
@@ -92,9 +84,6 @@ class Water:
         gust_share: standard deviation of gusts as a share of the mean wind.
         leeway_share: drift speed of a boat as a share of the wind speed.
         current_mps, current_to_deg: the current.
-
-    Raises:
-        ConfigError: a number out of range.
     """
 
     wind_mps: float = 0.0
@@ -122,9 +111,6 @@ class RadioSettings:
         loss: share of packets lost.
         delay_s: one way.
         jitter_s: extra delay, drawn per packet between 0 and this; packets may overtake each other.
-
-    Raises:
-        ConfigError: a number is out of range.
     """
 
     loss: float = 0.0

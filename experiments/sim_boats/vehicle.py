@@ -161,6 +161,7 @@ class Vehicle:
         mode, armed: present ones.
         texts: (severity, text) not yet sent.
         target: what the commander asked for; None when there is none or it timed out.
+        ground_s: when a heartbeat of the ground station came last.
 
     Raises:
         ConfigError: a parameter it does not have.
@@ -183,7 +184,7 @@ class Vehicle:
         self.booted_s, self.armed = now_s, False
         self.mode = Mode(int(self.parameters["INITIAL_MODE"]))
         self.target: Steer | Turn | None = None
-        self._target_s, self._ground_s, self._timed_out = -math.inf, math.inf, False
+        self._target_s, self.ground_s, self._timed_out = -math.inf, math.inf, False
         self.texts.clear()
         self.texts.append((INFO, "ArduPilot Ready"))
 
@@ -231,10 +232,6 @@ class Vehicle:
         self.target, self._target_s, self._timed_out = target, now_s, False
         return True
 
-    def hear_ground(self, now_s: float) -> None:
-        """A heartbeat of the ground station came."""
-        self._ground_s = now_s
-
     def tick(self, now_s: float) -> None:
         """Look at the clocks: targets that grew old, ground stations gone silent."""
         limit = self.settings.timeout_s
@@ -243,7 +240,7 @@ class Vehicle:
             self.target, self._timed_out = None, True
         patience = self.parameters["FS_GCS_TIMEOUT"] + self.parameters["FS_TIMEOUT"]
         watched = self.parameters["FS_GCS_ENABLE"] != 0.0 and self.armed and self.mode is not Mode.HOLD
-        if watched and now_s - self._ground_s > patience:
+        if watched and now_s - self.ground_s > patience:
             self.texts.append((CRITICAL, "Radio Failsafe"))
             self.set_mode(Mode.HOLD, now_s)
 

@@ -68,23 +68,15 @@ def circumstances(marks: Marks, last: Sequence[int], step: int, boats: Sequence[
         step: step of the violation; the first is 1.
         boats: numbers of the two boats.
     """
-    recent = marks[max(0, step - round(RECENT_S / STEP_S)) : step]
-    is_over = 0 < max(last) < step
+    recent, soon = marks[max(0, step - round(RECENT_S / STEP_S)) : step], round(LEFT_S / STEP_S)
+    until = marks[:step][::-1]
+    unsteered = [next((k for k, row in enumerate(until) if row[boat].steered), len(until)) for boat in boats]
+    left = [not last[boat] or any(row[boat].held for row in marks[last[boat] :][:soon]) for boat in boats]
     return {
-        "unsteered_s": [_unsteered_s(marks[:step], boat) for boat in boats],
+        "unsteered_s": [round(steps * STEP_S, 3) for steps in unsteered],
         "faults": sorted({kind for row in recent for boat in boats for kind in row[boat].faults}),
-        "after_run": is_over and all(not last[boat] or _is_left(marks[last[boat] :], boat) for boat in boats),
+        "after_run": 0 < max(last) < step and all(left),
     }
-
-
-def _is_left(after: Marks, boat: int) -> bool:
-    """Whether the boat was in HOLD soon after its last command."""
-    return any(row[boat].held for row in after[: round(LEFT_S / STEP_S)])
-
-
-def _unsteered_s(until: Marks, boat: int) -> float:
-    back = next((k for k, row in enumerate(reversed(until)) if row[boat].steered), len(until))
-    return round(back * STEP_S, 3)
 
 
 @dataclass(frozen=True)
