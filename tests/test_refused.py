@@ -7,14 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from steerclear import policies
-from steerclear.env.config import GameConfig
+from steerclear.env.config import GameConfig, as_config
 from steerclear.env.core import BatchedMctf
 from steerclear.env.field import field_geometry
 from steerclear.env.mctf import MctfEnv
 from steerclear.env.pyquaticus_config import from_pyquaticus
-from steerclear.env.record import GameRecorder
+from steerclear.env.record import GameRecorder, find_breaches
 from steerclear.env.render import Renderer
 from steerclear.shield import Commands, Fleet, Reason, Shield, ShieldConfig, Surroundings, exceptions
+from steerclear.shield.barriers import Barrier
 from steerclear.shield.batch import BatchedShield
 from steerclear.shield.platforms import Gains, Platform, get_platform
 from steerclear.shield.platforms import layout as L
@@ -84,6 +85,16 @@ def start(init=None, **more):
         raise
 
 
+def followed(seen, dt_s):
+    """A referee that is shown boats; where that is refused nothing has changed."""
+    referee = BatchedMctf(ISLAND, seed=0)
+    before = referee.state.copy()
+    try:
+        referee.follow(seen, dt_s)
+    finally:
+        np.testing.assert_array_equal(referee.state, before)
+
+
 class Decisions:
     """Decisions about two boats, made when they are asked for."""
 
@@ -91,6 +102,21 @@ class Decisions:
         return Shield().decide(fleet(), AHEAD)[index]
 
 
+HELPERS = (fleet, redecided, followed, integrator, file, problem, start)
+CALLED = (
+    *(Barrier, BatchedMctf, BatchedShield, Commands, Gains, GameConfig, GameRecorder, MctfEnv, Shield, ShieldConfig),
+    *(
+        Surroundings,
+        TeamBatch,
+        as_config,
+        find_breaches,
+        games_shield,
+        get_platform,
+        parse_platform,
+        problem_of,
+        replace,
+    ),
+)
 KNOWN = {
     "boat": lambda **changes: replace(get_platform("heron"), **changes),
     "rover": lambda **changes: replace(get_platform("ardurover_boat"), **changes),
@@ -101,21 +127,9 @@ KNOWN = {
     "renderer": lambda **settings: Renderer(GameConfig.preset("aamas2024"), **settings),
     "batch": lambda **settings: TeamBatch(BatchedMctf("aamas2024"), **settings),
     "decisions": Decisions(),
-    **{
-        "np": np,
-        "math": math,
-        "L": L,
-        "policies": policies,
-        "TRIANGLE": TRIANGLE,
-        "ISLAND": ISLAND,
-        "BATCHED": BATCHED,
-    },
-    **{one.__name__: one for one in (fleet, redecided, integrator, file, problem, start, get_platform, parse_platform)},
-    **{
-        one.__name__: one
-        for one in (Shield, Commands, ShieldConfig, Surroundings, BatchedShield, Gains, problem_of, replace)
-    },
-    **{one.__name__: one for one in (TeamBatch, BatchedMctf, MctfEnv, GameConfig, GameRecorder, games_shield)},
+    **{"np": np, "math": math, "L": L, "policies": policies},
+    **{"TRIANGLE": TRIANGLE, "ISLAND": ISLAND, "BATCHED": BATCHED},
+    **{one.__name__: one for one in (*HELPERS, *CALLED)},
 }
 
 

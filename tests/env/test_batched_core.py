@@ -1,10 +1,12 @@
+"""Many games at once are single games, bit for bit; what is handed in is checked; events are rewarded."""
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from steerclear.env.config import GameConfig, RewardWeights
 from steerclear.env.core import BatchedMctf
-from steerclear.shield.exceptions import ConfigError, GameError
+from steerclear.shield.exceptions import GameError
 from steerclear.shield.platforms import layout as L
 
 NAMES = (
@@ -83,21 +85,6 @@ def test_resetting_some_games_leaves_the_others_alone():
     np.testing.assert_array_equal(core.state, first)
 
 
-@pytest.mark.parametrize(
-    ("actions", "message"),
-    [
-        (np.zeros((1, 4, 2)), r"actions have shape \(1, 4, 2\); give \(2, 4, 2\)"),
-        (np.zeros((2, 4)), "actions have shape"),
-        (np.full((2, 4, 2), np.nan), "action of agent_0 in game 0 is not finite"),
-        (np.full((2, 4, 2), 1e9), "action of agent_0 in game 0 is beyond 1e\\+06"),
-    ],
-)
-def test_unusable_actions_are_refused(actions, message):
-    core = BatchedMctf(RANDOM, 2, seed=0)
-    with pytest.raises(GameError, match=message):
-        core.step(actions)
-
-
 def test_the_boat_and_the_game_of_a_bad_command_are_named_and_nothing_moves():
     core = BatchedMctf(RANDOM, 2, seed=0)
     before = core.state.copy()
@@ -110,17 +97,6 @@ def test_the_boat_and_the_game_of_a_bad_command_are_named_and_nothing_moves():
     with pytest.raises(GameError, match="commands have shape"):
         core.step(np.zeros((2, 4, 2)), lambda _, commands: commands[0])
     np.testing.assert_array_equal(core.state, before)
-
-
-def test_bad_counts_seeds_and_masks_are_refused():
-    with pytest.raises(ConfigError, match="n_games is 0"):
-        BatchedMctf(RANDOM, 0)
-    with pytest.raises(ConfigError, match="seed is -1"):
-        BatchedMctf(RANDOM, 1, seed=-1)
-    core = BatchedMctf(RANDOM, 2, seed=0)
-    for mask in (np.ones(3, dtype=bool), np.ones(2)):
-        with pytest.raises(GameError, match=r"give bool of shape \(2,\)"):
-            core.reset(mask)
 
 
 def test_rewards_weigh_the_events_of_both_teams(place, hold):

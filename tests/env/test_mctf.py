@@ -1,4 +1,4 @@
-"""A policy written for Pyquaticus, built with the environment object, runs here unchanged."""
+"""The environment: actions, filters and rewards; a policy written for Pyquaticus runs here unchanged."""
 
 import enum
 import logging

@@ -1,3 +1,5 @@
+"""How the game moves boats: off obstacles and the own flag, home when tagged or out of bounds."""
+
 import math
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Observations and the global state, against a plain description of what a boat sees."""
+
 import math
 
 import numpy as np

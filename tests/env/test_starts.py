@@ -1,3 +1,5 @@
+"""Fields, and where games start: on fixed places, at random, or from a partial state."""
+
 import numpy as np
 import pytest
 from steerclear.env.compat import Team

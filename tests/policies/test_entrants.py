@@ -1,4 +1,4 @@
-"""The competition's entrants: they play either side under every preset, alike when seeded alike, as their row says."""
+"""The competition's entrants: either side under every preset, alike when seeded alike."""
 
 import math
 

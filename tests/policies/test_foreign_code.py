@@ -120,12 +120,6 @@ def test_agents_that_cannot_play_are_refused(game, agents, words):
         policies.from_agents(agents).reset(game[0], ["agent_0"], 0)
 
 
-@pytest.mark.parametrize("wrong", [4, {}, {"agent_0": 4}, lambda obs, info: 4])
-def test_functions_that_cannot_be_called_are_refused(wrong):
-    with pytest.raises(PolicyError, match=r"f\(obs\)"):
-        policies.from_callable(wrong)
-
-
 def test_a_boat_whose_code_raises_holds_and_the_others_play_on(game, caplog):
     def broken(observation):
         raise ValueError("lost my\nmap")

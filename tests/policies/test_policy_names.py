@@ -1,4 +1,4 @@
-"""A policy of your own by the name of its file or module."""
+"""Policies by name: the registry, files of one's own, their digests, and a person at the keyboard."""
 
 import os
 import re

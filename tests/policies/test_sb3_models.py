@@ -1,3 +1,5 @@
+"""Models of Stable-Baselines3: actions as they predict them; no code of strangers is run unasked."""
+
 import base64
 import importlib
 import io

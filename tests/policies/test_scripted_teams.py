@@ -1,4 +1,4 @@
-"""The organisers' opponents give the very actions recorded by running Pyquaticus (commit c0a3691)."""
+"""Scripted teams: the organisers' recorded actions, either side alike, batches as single games, the rammer."""
 
 import json
 import math
@@ -318,6 +318,18 @@ def test_no_earlier_meeting_is_missed(east, north, v_east, v_north, speed):
         gap = math.hypot(east + v_east * earlier, north + v_north * earlier) - speed * earlier
         if math.hypot(east, north) > 1e-6 and time < 30.0 and time != pytest.approx(math.hypot(east, north) / speed):
             assert gap > -1e-6
+
+
+def test_leads_its_target():
+    """It steers ahead of a crossing boat, not at it."""
+    core = BatchedMctf(GameConfig.preset("aamas2024", team_size=1))
+    core.state[0, 0, :4] = [30.0, 20.0, 0.0, 0.0]
+    core.state[0, 1, :4] = [30.0, 30.0, 90.0, 1.0]
+    team = policies.make_batch("rammer")
+    team.reset(core, 0, 0)
+    speed, heading = team.act(core, 0)[0, 0]
+    assert speed == 2.0
+    assert heading == pytest.approx(30.0)  # asin(1 / 2): the sideways speeds agree
 
 
 def test_does_not_leave_the_field_to_meet_a_boat():

@@ -78,6 +78,22 @@ def sail_games(config, state, platforms, team, wanted, steps, ours=None, surroun
     return Run(np.array(position), np.array(reason), np.array(sent), np.array(certificate))
 
 
+def bearing_deg(way):
+    """Bearings of ways (..., 2), m."""
+    return np.degrees(np.arctan2(way[..., 0], way[..., 1]))
+
+
+def on_course(course_deg, speed_mps):
+    """Commands that hold boats to courses, deg, or what a function of step and states says, at a speed, m/s."""
+
+    def wanted(step, state):
+        course = course_deg(step, state) if callable(course_deg) else np.asarray(course_deg)
+        error = (course - state[..., L.HEADING] + 180.0) % 360.0 - 180.0
+        return np.stack([np.broadcast_to(speed_mps, error.shape), error], axis=-1)
+
+    return wanted
+
+
 def fill(state, params):
     """Give boats whose thrust is unknown the thrust that holds their speed, in place."""
     for row, param in zip(state, params, strict=True):

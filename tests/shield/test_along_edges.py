@@ -1,8 +1,8 @@
-"""Boats that want through an edge or a wall for ever sail along it, steadily and without losing their speed."""
+"""Boats that press through edges, walls and corners sail along them, steadily, and come back from beyond."""
 
 import numpy as np
 import pytest
-from shield_loops import Wander, sail_games, scattered
+from shield_loops import Wander, bearing_deg, on_course, sail_games, scattered
 from steerclear.shield import ShieldConfig, Surroundings
 from steerclear.shield.backup.paths import SAG_M
 from steerclear.shield.platforms import get_platform
@@ -127,12 +127,7 @@ def press_into_the_corner(platform, boats):
     state = scattered(np.random.default_rng(1), CORNER_GAMES, [platform] * boats, side_m, gap_m=gap_m, speed=(0.3, 1.0))
     state[..., :2] += (115.0, 15.0)
     top = get_platform(platform).max_speed_mps
-
-    def wanted(step, state):
-        east, north = np.moveaxis(CORNER - state[..., :2], -1, 0)
-        error = (np.degrees(np.arctan2(east, north)) - state[..., L.HEADING] + 180.0) % 360.0 - 180.0
-        return np.stack([np.full(error.shape, top), error], axis=-1)
-
+    wanted = on_course(lambda _, state: bearing_deg(CORNER - state[..., :2]), top)
     around = Surroundings(field=FIELD)
     run = sail_games(ShieldConfig(), state, [platform] * boats, [0] * boats, wanted, 650, surroundings=around)
     return run.position, run.closest(np.ones(boats, bool))

@@ -39,8 +39,6 @@ ODD = {
     **{kind: PLAIN.astype(kind) for kind in ("float32", "float16", "longdouble", ">f8", "object")},
     "Fortran": np.asfortranarray(PLAIN),
     "strided": np.repeat(PLAIN, 2, axis=1)[:, ::2],
-    "reversed": np.flip(np.flip(PLAIN).copy()),
-    "broadcast": np.broadcast_to(PLAIN, (1, 2, 2))[0],
     "read-only": read_only(PLAIN),
     "unaligned": unaligned(PLAIN),
     "decimals": [[Decimal("2"), Decimal("0.25")], [1, Decimal("-3")]],
@@ -83,18 +81,14 @@ def test_tensors_lose_their_gradient_and_nothing_else():
     [
         ("12", "texts"),
         (b"12", "texts"),
-        (["1.0", "2.0"], "texts"),
         (np.array(["1.0", 2.0], dtype=object), "texts"),
         ([1.0 + 2.0j], "complex"),
         ([[1.0], [2.0, 3.0]], "inhomogeneous"),
         (np.ma.masked_array([1.0, 2.0], mask=[True, False]), "masked"),
         (np.zeros(2, "datetime64[s]"), "datetime64"),
-        (np.zeros(2, [("x", float)]), "x"),
-        ({1.0, 2.0}, "set"),
         ({"x": 1.0}, "dict"),
         ([10**400], "too large"),
         (object(), "float"),
-        (lambda: 1.0, "float"),
     ],
 )
 def test_what_holds_no_numbers_is_refused(value, text):
@@ -199,14 +193,14 @@ def test_no_layout_changes_a_decision_or_is_compiled_for(name, fleet_of):
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        ({"wanted": "fast"}, "wanted is not an array of numbers"),
+        ({"nominal": "fast"}, "nominal is not an array of numbers"),
         ({"ours": np.full((1, 2), 2)}, "ours is not an array of True or False .*neither True nor False"),
         ({"state": np.zeros((1, 2, 3))}, "state has shape"),
     ],
 )
 def test_batches_refuse_what_is_none(change, text):
     shield = BatchedShield(ShieldConfig(), 1, ("heron", "heron"), (0, 1))
-    arrays = {"state": meeting(np.asarray).state[None], "wanted": np.zeros((1, 2, 2)), "ours": np.ones((1, 2), bool)}
+    arrays = {"state": meeting(np.asarray).state[None], "nominal": np.zeros((1, 2, 2)), "ours": np.ones((1, 2), bool)}
     with pytest.raises(FleetError, match=text):
         shield.decide(**{**arrays, **change})
     with pytest.raises(FleetError, match="mask is int64"):

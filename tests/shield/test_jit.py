@@ -1,4 +1,4 @@
-"""Machine code is kept on disk, read in new processes, made anew when its sources or its files are not as they were."""
+"""Machine code: kept on disk, made anew when sources changed, nothing after the warm-up; numba as it is used."""
 
 import importlib
 import os
@@ -13,8 +13,9 @@ import pytest
 import steerclear.shield
 from numba import njit
 from numba.core.dispatcher import Dispatcher
+from shield_scenes import head_on
 from steerclear.env.arrays import Games, Rules
-from steerclear.shield import jit, whole_program
+from steerclear.shield import Commands, Shield, decide, jit, shield, whole_program
 from steerclear.shield.jit import COMPILE_NOTHING, _beside, _stamp, kernel, lean_kernel
 from steerclear.shield.workspace import Boats, Registered, Scene, Static, Tuning
 
@@ -61,16 +62,12 @@ def call(tmp_path):
     return called
 
 
-def test_a_new_process_reads_what_another_kept_and_does_as_it_did(call):
+def test_a_new_process_reads_what_another_kept_unless_it_has_changed(call):
     first, said = call()
     assert first == 12.0
     assert "compiles its machine code" in said
     assert call() == (12.0, "")
-
-
-def test_what_a_changed_callee_does_is_seen(call):
-    call()
-    assert call(inner="5.0 * x")[0] == 30.0
+    assert call(inner="5.0 * x")[0] == 30.0, "what a changed callee does is seen"
 
 
 def test_what_changes_while_a_process_runs_is_not_taken_for_what_that_compiles(call, tmp_path):
@@ -259,3 +256,46 @@ def test_only_what_python_calls_becomes_machine_code():
 def test_a_kernel_is_called_by_functions_that_numba_compiles_itself():
     inner = kernel(lambda x: x + 1)
     assert njit(lambda x: inner(x) * 2)(1.5) == 5.0
+
+
+AHEAD = Commands.relative_deg(np.array([[2.0, 0.0]] * 2))
+
+STAGES = "begin", "begin_group", "linearise", "accept", "end_group", "end"
+
+
+@pytest.fixture
+def stages_run(monkeypatch):
+    """Names of the stages that are run where a backend of qpsolvers stands between them."""
+    seen = set()
+    for name in STAGES:
+        stage = getattr(decide, name)
+        monkeypatch.setattr(decide, name, lambda *values, name=name, stage=stage: (seen.add(name), stage(*values))[1])
+    return seen
+
+
+def test_what_is_run_needs_every_stage(stages_run):
+    fleet, wanted, around = shield._tight_spot()
+    decisions = Shield(solver="daqp").decide(fleet, wanted, around)
+    assert stages_run == set(STAGES)
+    np.testing.assert_array_equal(Shield().decide(fleet, wanted, around).reason, decisions.reason)
+
+
+@pytest.mark.parametrize("coordination", ["team", "per_boat"])
+def test_decisions_are_the_same_with_and_without(coordination):
+    told = []
+    for warm in (False, True):
+        guard = Shield(coordination=coordination, delay_s=0.2)
+        fleet = head_on(5.5)
+        before = [guard.decide(fleet, AHEAD).filtered.values]
+        if warm:
+            guard.warm_up(fleet)
+        before += [guard.decide(fleet, AHEAD).filtered.values for _ in range(3)]
+        told.append(np.array(before))
+    np.testing.assert_array_equal(*told)
+
+
+@pytest.mark.parametrize("settings", [{}, {"position_error_m": 0.3, "delay_s": 0.2}, {"separation_m": 4.0}])
+def test_every_stage_is_compiled_whatever_the_settings(stages_run, settings):
+    """Wide margins leave no room for the program where the boats are; its check would be compiled under way."""
+    Shield(solver="daqp", **settings).warm_up()
+    assert stages_run == set(STAGES)

@@ -1,4 +1,4 @@
-"""Settings are checked when they are given, in words that help."""
+"""Settings and surroundings are checked when they are given; old names are taken with a warning."""
 
 import copy
 import math

@@ -1,16 +1,20 @@
-"""A boat that is kept from turning by an opponent that holds its course does not sail on beside it for good."""
+"""A boat that an opponent keeps from turning does not sail on beside it for good; one pursued gains speed."""
 
 import numpy as np
 import pytest
 from shield_loops import fill, packed, sail, step_all
 from shield_scenes import fleet_of
+from steerclear.experiments.encounters import Conditions, draw, play
 from steerclear.shield import Commands, Fleet, Reason, Shield, Surroundings
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
 
 GOAL_M = {"heron": 30.0, "surveyor": 72.0}
+
 STEPS = {"heron": 450, "surveyor": 600}
+
 COMES = {"heron": (-13.5, 6.75, 60.0, 1.96), "surveyor": (-33.0, 27.7, 53.0, 2.45)}
+
 """Opponents that come from the left: east and north, m, heading, deg, speed, m/s."""
 
 
@@ -114,3 +118,13 @@ def test_an_opponent_that_is_overtaken_is_passed():
     assert (run.reason[:, 0] == Reason.BACKUP).any()
     assert run.closest(np.array([True, False])) >= 2.5
     assert run.position[:, 0, 1].max() > 57.0
+
+
+@pytest.mark.parametrize("number", [51, 81, 99, 125, 177, 223, 256, 296])
+def test_boats_at_rest_that_can_get_away_do(number):
+    """Encounters that ended with a hit as long as single wanted turns were sent that looked a little better."""
+    conditions = Conditions()
+    film = play(draw("at_rest", "surveyor", "surveyor", conditions, 0, number, 1), "shield:profile=ramming", conditions)
+    assert film.safety_margin_m[0, 0, 0] > 0.3
+    own, other = film.state[:, 0, 0, :2], film.state[:, 0, 1, :2]
+    assert np.linalg.norm(own - other, axis=-1).min() >= 2.5

@@ -1,4 +1,4 @@
-"""Raids by a network: one game as one of a batch, sides and edges alike, as undertow where it says nothing."""
+"""Learned policies: one game as one of a batch, as learned; raids as undertow where the network says nothing."""
 
 from dataclasses import astuple, replace
 from itertools import pairwise

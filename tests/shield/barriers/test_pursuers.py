@@ -1,4 +1,4 @@
-"""The pursuers of the certificate against pursuers of the full boat model."""
+"""Pursuers of the certificate against those of the full model; several opponents; rammers of slow boats."""
 
 import itertools
 import math

@@ -168,10 +168,6 @@ def test_copies_of_a_shield_find_their_barriers(again):
 
 
 def test_names_are_checked_when_a_shield_is_built():
-    with pytest.raises(ConfigError, match=r"unknown barrier 'fery'.*register_barrier"):
-        Shield(barriers=("fery",))
-    with pytest.raises(ConfigError, match="give names"):
-        Shield(barriers=3)
     register_barrier(Barrier("a", ferrys, values=FERRY))
     register_barrier(Barrier("b", ferrys, values=FERRY))
     assert ShieldConfig(barriers="a+b").barriers == ("a", "b") == ShieldConfig(barriers=["a", "b", "a"]).barriers
@@ -181,11 +177,6 @@ def test_names_are_checked_when_a_shield_is_built():
         register_barrier(Barrier("a", ferrys))
     with pytest.raises(ConfigError, match="is no barrier"):
         register_barrier(3)
-    for values in ([math.nan], [[1.0]], ["x"], [0.0] * 65):
-        with pytest.raises(ConfigError, match="values of barrier"):
-            Barrier("c", ferrys, values=values)
-    with pytest.raises(ConfigError, match="cannot be named"):
-        Barrier("no name", ferrys)
 
 
 def test_a_zip_refuses_them_by_name():

@@ -1,3 +1,5 @@
+"""Value tables as the certificate uses them, and opponents without a table."""
+
 import math
 from dataclasses import replace
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from shield_loops import sail_games, scattered
+from shield_loops import on_course, sail_games, scattered
 from steerclear.shield import ShieldConfig, Surroundings
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
@@ -21,12 +21,7 @@ def lying(x_m, y_m, bow_deg):
 
 def sailed(platform, state, wanted_share, wanted_deg, seconds=LONG_S, **around):
     """Where boats get, (T, games, 2) m, that want a course at a share of top speed."""
-    speed = wanted_share * get_platform(platform).max_speed_mps
-
-    def wanted(step, state):
-        off = wanted_deg - state[..., L.HEADING]
-        return np.stack([np.full(off.shape, speed), (off + 180.0) % 360.0 - 180.0], axis=-1)
-
+    wanted = on_course(wanted_deg, wanted_share * get_platform(platform).max_speed_mps)
     around = Surroundings(**around)
     return sail_games(
         ShieldConfig(obstacle_clearance_m=0.0), state, [platform], [0], wanted, 10 * seconds, surroundings=around

@@ -1,4 +1,4 @@
-"""The hard line, and obstacles nobody may touch: a boat is stopped there, whatever is behind it."""
+"""Backups: the hard line at which a boat is stopped, those of teammates, and how long one is held."""
 
 import json
 from pathlib import Path
@@ -74,6 +74,21 @@ def test_nobody_is_driven_ashore(platform):
         touched[then] = (run.position[:, 0, 0] > SHORE[0][0] - 0.5).any(), (run.reason[:, 0] == Reason.STOPPED).any()
     assert touched["stop"][0] == False  # noqa: E712 - numpy's
     assert touched["flee"][1] == False  # noqa: E712
+
+
+def test_a_wall_is_stopped_before_that_no_other_rule_keeps():
+    """A boat told to go on into a corner of walls by opponents on all sides stops."""
+    around = Surroundings(polygons=[SHORE])
+    shield = Shield(profile="ramming", beyond_then="stop", surroundings=around)
+    start = Fleet.of(
+        position_m=[(80.0, 20.0), (77.0, 23.0), (77.0, 17.0), (76.5, 20.0)],
+        heading_deg=[90.0] * 4,
+        speed_mps=[2.0] * 4,
+        team=[0, 1, 1, 1],
+        platforms="heron",
+    )
+    run = sail(shield, start, lambda _, state: np.stack([np.full(4, 2.0), 90.0 - state[:, 2]], axis=-1), 200)
+    assert (run.position[:, 0, 0] <= SHORE[0][0] - 0.5 + 1e-6).all()
 
 
 def test_a_decision_says_how_far_outside_and_that_it_stops():

@@ -1,4 +1,4 @@
-"""The program through qpsolvers: only answers that satisfy every row by our own residuals count."""
+"""The program: only answers that satisfy every row count; the compiled projection against a QP solver."""
 
 import math
 import time

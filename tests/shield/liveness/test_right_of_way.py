@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from shield_loops import fill, packed, sail, sail_games, step_all
+from shield_loops import fill, on_course, packed, sail, sail_games, step_all
 from shield_scenes import fleet_of
 from steerclear.shield import Commands, Reason, Shield, ShieldConfig
 from steerclear.shield.platforms import get_platform
@@ -87,13 +87,7 @@ def abreast(platform="heron", starboard_m=2.7, ahead_m=0.0):
 
 def press_together(fleet, steps, turns=(90.0, -90.0), **settings):
     top = get_platform(fleet.platforms[0]).max_speed_mps
-    shield = Shield(ShieldConfig(**settings))
-
-    def wanted(step, state):
-        error = np.array(turns) - state[:, L.HEADING]
-        return np.stack([np.full(2, top), (error + 180.0) % 360.0 - 180.0], axis=-1)
-
-    return sail(shield, fleet, wanted, steps)
+    return sail(Shield(ShieldConfig(**settings)), fleet, on_course(turns, top), steps)
 
 
 def roles(run):
@@ -183,12 +177,7 @@ def test_boats_that_come_and_go_far_away_change_nothing_about_who_gives_way():
 def test_three_abreast_that_press_inwards_all_get_where_they_want():
     top = get_platform("heron").max_speed_mps
     fleet = fleet_of([(0, 0, 0, top), (2.8, 0, 0, top), (5.6, 0, 0, top)], [0, 0, 0], "heron")
-
-    def wanted(step, state):
-        error = np.array([90.0, 0.0, -90.0]) - state[:, L.HEADING]
-        return np.stack([np.full(3, top), (error + 180.0) % 360.0 - 180.0], axis=-1)
-
-    run = sail(Shield(), fleet, wanted, 300)
+    run = sail(Shield(), fleet, on_course([90.0, 0.0, -90.0], top), 300)
     assert run.closest(np.ones(3, bool)) >= 2.5
     assert run.position[-1, 0, 0] > run.position[-1, 2, 0] + 10.0
 

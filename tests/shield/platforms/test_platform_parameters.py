@@ -1,4 +1,4 @@
-"""Platforms refuse parameters that make no sense, in words that help."""
+"""Platforms and their files: every setting has a unit, and each boat of the package is one."""
 
 import math
 from dataclasses import replace

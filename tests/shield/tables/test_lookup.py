@@ -90,26 +90,6 @@ def test_gradients_are_those_of_finite_differences():
     assert seen > 250
 
 
-@settings(max_examples=80, deadline=None)
-@given(st.floats(0.01, 30.0), FINITE, ANGLE, SPEED, SPEED)
-def test_the_mirrored_scene_has_the_mirrored_gradient(x, y, other, v, w):
-    star, port = (
-        table_gradient(TABLES, 1, WHOLE_S, x, y, 0.0, other, v, w),
-        table_gradient(TABLES, 1, WHOLE_S, -x, y, 0.0, -other, v, w),
-    )
-    assert port.value_m == pytest.approx(star.value_m, abs=1e-9)
-    if math.remainder(other, math.pi / 4.0) != 0.0:  # on a node either side's slope is right
-        mirrored = [-port.own_x, port.own_y, -port.own_heading, port.own_speed, -port.other_heading, port.other_speed]
-        np.testing.assert_allclose(mirrored, star[1:], atol=1e-6)
-
-
-def test_nearer_than_the_table_the_value_is_the_distance():
-    found = table_gradient(TABLES, 1, WHOLE_S, 0.3, -0.4, 1.0, 2.0, 1.0, 1.0)
-    assert found.value_m == pytest.approx(0.5) == table_value(TABLES, 1, WHOLE_S, 0.3, -0.4, 1.0, 2.0, 1.0, 1.0)
-    assert (found.own_x, found.own_y) == pytest.approx((-0.6, 0.8))
-    assert table_gradient(TABLES, 1, WHOLE_S, 0.0, 0.0, 1.0, 2.0, 1.0, 1.0)[:3] == (0.0, 0.0, 0.0)
-
-
 def test_beyond_the_table_its_edge_holds():
     last = table_range_m(TABLES, 1)
     assert last == pytest.approx(12.0)

@@ -1,4 +1,4 @@
-"""Settings of a Pyquaticus environment: taken as they are meant, or refused by name."""
+"""Environments of Pyquaticus: settings as meant or refused by name; policies of every kind play there."""
 
 from types import SimpleNamespace
 

@@ -1,4 +1,4 @@
-"""Vector environments: one team's boats in many games as a flat batch of learners, with the shield inside."""
+"""Vector environments: one team's boats in many games as a flat batch of learners, the shield inside."""
 
 import sys
 

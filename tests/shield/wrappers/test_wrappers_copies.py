@@ -3,7 +3,6 @@
 import copy
 import multiprocessing
 import pickle
-import threading
 from itertools import product
 
 import cloudpickle
@@ -118,21 +117,6 @@ def test_another_process_plays_the_same_games(method):
     finally:
         worker.join(10.0)
         worker.kill()
-
-
-def test_threads_with_wrappers_of_their_own_do_not_mix_their_games():
-    games = [begun(Env) for _ in range(2)]
-    alone, found = begun(Env).play(), [None, None]
-
-    def play(i):
-        found[i] = games[i].play()
-
-    threads = [threading.Thread(target=play, args=(i,), daemon=True) for i in range(2)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join(60.0)
-    assert found == [alone, alone]
 
 
 @pytest.mark.parametrize("way", [*COPIES, "another game"])
