@@ -27,7 +27,7 @@ from .config import ShieldConfig
 from .filter.backup_switch import back_up
 from .filter.blend import any_may_be_blended, blend, verify
 from .filter.groups import close_groups, make_groups, open_group
-from .filter.last_line import keep_last_line
+from .filter.last_line import keep_last_line, note_last_resorts
 from .filter.nominal import check_nominal
 from .filter.program import Program, Solver
 from .filter.qp import ROUNDS, accept, among_mates, begin_program, end_program, linearise, solve
@@ -90,6 +90,7 @@ def load_decision(b: int, scene: Scene) -> None:
     for i in range(ours.shape[0]):
         ours[i] = given[i, W.OURS] != 0.0
         copy_row(state[i], given[i, : L.N_STATE])
+        scene.last_resort[i] = W.NO_LAST_RESORT
     note_predicted(given, scene)
     _note_adversary_horizons(given, scene)
     astern_as_turned_ahead(state, ours)
@@ -252,28 +253,37 @@ def end_group(scene: Scene, safe: bool, count: int) -> None:
 
 
 @lean_kernel
-def end(scene: Scene) -> None:
-    """Note active constraints and reasons, and keep what the next decision needs."""
+def end(scene: Scene) -> bool:
+    """Note active constraints and reasons, and keep what the next decision needs; return whether that is all.
+
+    It is not if a boat has to stop that was to go on: the decision is made again around that stop, since the others
+    were verified against what it was to do.
+    """
     close_groups(scene)
+    if note_last_resorts(scene):
+        return False
     keep_last_line(scene)
     commit(scene)
     _name_reasons(scene)
+    return True
 
 
 @lean_kernel
 def decide_scene(scene: Scene) -> None:
     """Make the whole decision: filtered commands go to ``scene.command``, reasons to ``scene.reason``."""
-    for group in range(begin(scene)):
-        count, safe = begin_group(group, scene), False
-        for _ in range(ROUNDS if count > 0 else 0):
-            rows = linearise(count, scene)
-            if rows < 0 or not solve(count, rows, scene):
-                break
-            safe = accept(scene, scene.z, count)
-            if safe:
-                break
-        end_group(scene, safe, count)
-    end(scene)
+    while True:
+        for group in range(begin(scene)):
+            count, safe = begin_group(group, scene), False
+            for _ in range(ROUNDS if count > 0 else 0):
+                rows = linearise(count, scene)
+                if rows < 0 or not solve(count, rows, scene):
+                    break
+                safe = accept(scene, scene.z, count)
+                if safe:
+                    break
+            end_group(scene, safe, count)
+        if end(scene):
+            return
 
 
 @kernel
@@ -287,18 +297,20 @@ def decide_all(scene: Scene) -> None:
 
 def _decide_with(solver: Solver, scene: Scene) -> None:
     """`decide_scene` with another solver of its programs."""
-    for group in range(begin(scene)):
-        count, safe = begin_group(group, scene), False
-        for _ in range(ROUNDS if count > 0 else 0):
-            rows, n = linearise(count, scene), 2 * count
-            z = solver(Program(scene.C[:rows, :n], scene.d[:rows], scene.z0[:n])) if rows >= 0 else None
-            if z is None:
-                break
-            safe = accept(scene, z, count)
-            if safe:
-                break
-        end_group(scene, safe, count)
-    end(scene)
+    while True:
+        for group in range(begin(scene)):
+            count, safe = begin_group(group, scene), False
+            for _ in range(ROUNDS if count > 0 else 0):
+                rows, n = linearise(count, scene), 2 * count
+                z = solver(Program(scene.C[:rows, :n], scene.d[:rows], scene.z0[:n])) if rows >= 0 else None
+                if z is None:
+                    break
+                safe = accept(scene, z, count)
+                if safe:
+                    break
+            end_group(scene, safe, count)
+        if end(scene):
+            return
 
 
 class Deciders:

@@ -22,6 +22,7 @@ from .tables.files import ValueTable, load_table, stack_tables
 from .tables.grid import CAP
 from .tables.lookup import Tables
 from .tables.settings import OtherMay
+from .tracks import steps_of_delay
 from .workspace import Boats, Tuning
 
 _LOG = logging.getLogger(__name__)
@@ -72,7 +73,7 @@ def tuning_of(config: ShieldConfig) -> Tuning:
             adversary_horizon_s=config.effective_adversary_horizon_s,
             intruder_horizon_s=config.effective_intruder_horizon_s,
             position_error_m=config.position_error_m,
-            delay_s=config.delay_s,
+            delay_s=steps_of_delay(config) * config.dt_s,
             track_error_mps=config.track_error_mps,
             work_budget=config.work_budget,
         )
@@ -153,12 +154,14 @@ def _horizons(
         chase_s = [max(0.0, CHASE_S - value) for value in pursuit_s]
     static_s = [min(limit.half_turn_s + STATIC_REACTION_S, own) for own, limit in zip(horizon_s, limits, strict=True)]
     top, side = np.array([kind.pack()[L.MAX_SPEED] for kind in kinds]), np.array(team)
+    samples = _samples(horizon_s, sample_s, 2)
     no_faster = (side[:, None] != side[None]) & (top[None] <= top[:, None])
     chase = np.where(no_faster, _samples(chase_s, sample_s, 0)[:, None], 0)
     return {
         "chase_samples": chase,
         "chased_samples": chase.max(axis=1, initial=0),
-        "samples": _samples(horizon_s, sample_s, 2),
+        "samples": samples,
+        "longest_samples": int(samples.max(initial=2)),
         "pursuit_samples": _samples(pursuit_s, sample_s, 2),
         "thrust_samples": _samples(thrust_s, sample_s, 0),
         "fade": np.array([math.exp(-FADE * sample_s / value) for value in pursuit_s]),

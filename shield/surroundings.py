@@ -19,6 +19,7 @@ from .exceptions import ConfigError
 from .fleet import LARGEST
 from .jit import Array
 from .shared import share
+from .tracks import steps_of_delay
 from .workspace import Registered, Static, new_registered
 
 Point = tuple[float, float]
@@ -120,7 +121,9 @@ class Surroundings:
 
 def off_m(config: ShieldConfig) -> float:
     """Return how far off a boat may be one step ahead, m, with room to turn; later drift is added along paths."""
-    return config.position_error_m + config.current_mps * (config.delay_s + config.dt_s + 2.0 * LEAVE_S)
+    return config.position_error_m + config.current_mps * (
+        steps_of_delay(config) * config.dt_s + config.dt_s + 2.0 * LEAVE_S
+    )
 
 
 def _each(name: str, value: object, form: str) -> tuple[Any, ...]:

@@ -19,6 +19,9 @@ from .tables.lookup import Tables
 PASSED, LEAST_CHANGE, QP_RELAXED, BACKUP, BEST_EFFORT, HELD, NOT_COVERED, RIGHT_OF_WAY, LIMITED, STOPPED = range(10)
 """Values of `decision.Reason`."""
 
+NO_LAST_RESORT, MUST_STOP, GO_ON = range(3)
+"""What the hard line makes of a boat: nothing; a stop; its last manoeuvre, where not even a stop stays clear."""
+
 BY_QP, BY_LINE_SEARCH = 1, 2
 """What found a least change; 0: none was found."""
 
@@ -64,6 +67,7 @@ class Boats(NamedTuple):
     granted_dec_mps2: Array  # (n,) rate at which each, as an opponent, loses speed in a turn
     granted_loss: Array  # (n,) share of top speed that each, as an opponent, loses in its granted turn
     samples: IntArray  # (n,) path samples of the horizon
+    longest_samples: int  # the most of them: every path is rolled out as far, for pairs of unlike boats
     pursuit_samples: IntArray  # (n,) path samples for which pursuers are followed once thrust is full; >= ``samples``
     chase_samples: IntArray  # (n, n) further samples for which a pursuer (column) no faster than the boat (row) is
     chased_samples: IntArray  # (n,) the most of them in each row
@@ -174,6 +178,7 @@ class Scene(NamedTuple):
     next_state: Annotated[Array, "n", L.N_STATE]  # states one step after them
     stepped: Annotated[Array, "n", 2]  # the commands that led there
     reason: Annotated[IntArray, "n"]
+    last_resort: Annotated[IntArray, "n"]  # what the hard line makes of each boat, see `filter.last_line`
     solver: Annotated[IntArray, "n"]  # what found the command, between nominal one and backup: `BY_QP` and the like
     slack_m: Annotated[Array, "n"]
     violated: Annotated[IntArray, "n"]  # constraint that the nominal command violates, as in ``bound``; -1: none
@@ -304,7 +309,8 @@ def new_memory(decisions: int, boats: int) -> Array:
 
 def path_samples(boats: Boats) -> int:
     """Return the most samples that paths of these boats have."""
-    return int((boats.pursuit_samples + boats.thrust_samples + boats.chased_samples).max(initial=1))
+    pursued = (boats.pursuit_samples + boats.thrust_samples + boats.chased_samples).max(initial=1)
+    return max(int(pursued), boats.longest_samples)
 
 
 PATH_COST = 2.0

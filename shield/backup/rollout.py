@@ -67,9 +67,9 @@ def lay_placed(i: int, slot: int, done: int, scene: Scene) -> None:
     """Roll out the manoeuvre that was placed in ``slot``."""
     boats, tuning, manoeuvre = scene.boats, scene.tuning, scene.manoeuvre[slot]
     how = pursuit_extent(i, slot, scene)
-    samples, chased = boats.samples[i], boats.pursuit_samples[i] + boats.chased_samples[i]
+    samples, chased = boats.longest_samples, boats.pursuit_samples[i] + boats.chased_samples[i]
     if how != NO_PURSUERS:
-        samples = chased + boats.thrust_samples[i]
+        samples = max(samples, chased + boats.thrust_samples[i])
     earliest = 0 if done == 1 else (boats.table_steps[i] + boats.stride - 1) // boats.stride
     if scene.outnumbered[i]:
         earliest = max(earliest, boats.joint_samples)
@@ -81,7 +81,7 @@ def lay_placed(i: int, slot: int, done: int, scene: Scene) -> None:
         tuning.moves if done == 1 else 0,
         boats.stride,
         samples,
-        boats.samples[i],
+        boats.longest_samples,
         chased if how == PURSUERS else 0,
         min(earliest, samples),
         boats.ready_thrust[i],

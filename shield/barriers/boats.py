@@ -41,14 +41,15 @@ def reported_margin(i: int, scene: Scene) -> float:
 def clear_of_boat(i: int, j: int, path: Array, scene: Scene, floor_m: float, cap_m: float) -> None:
     """Find the clearance row of boat i on ``path`` from boat j, in ``scene.out``.
 
-    A boat that is not own, and whose way is not predicted, holds course and speed.
+    A boat that is not own, and whose way is not predicted, holds course and speed. Two that both have a path are
+    compared for the longer of their horizons: the slower boat of a mixed team still turns when the nimble one is done.
     """
     state, ours, boats, tuning = scene.state, scene.ours, scene.boats, scene.tuning
     search = closing(i, j, scene), scene.radius[i, j], floor_m, cap_m
     tail, samples = tuning.straight_horizon_s / boats.sample_s, boats.samples[i]
     course, way = scene.course[j], state[j, L.SPEED] * boats.sample_s
     if ours[j] or scene.known[j]:
-        samples = min(samples, boats.samples[j])
+        samples = max(samples, boats.samples[j])
         clear_of_course(path, scene.path[j], course, way, samples, tail, search, scene.out)
     else:
         clear_of_course(path, scene.path[0, :0], course, way, samples, tail, search, scene.out)

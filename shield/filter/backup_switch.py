@@ -60,7 +60,7 @@ def list_movers(scene: Scene) -> int:
 
 
 @lean_kernel
-def _slack_of(i: int, scene: Scene) -> float:
+def slack_of(i: int, scene: Scene) -> float:
     """Return by how much boat i violates its distance from boats and static constraints, m."""
     least = reported_margin(i, scene)
     if scene.satisfied[i] >= OPPONENTS:
@@ -182,7 +182,8 @@ def _find_backups(count: int, scene: Scene) -> None:
         count = movers
     run_opponents(1, scene)
     for m in range(count):
-        command_backup(scene.movers[m], scene)
+        if scene.reason[scene.movers[m]] != STOPPED:
+            command_backup(scene.movers[m], scene)
     check(scene)
 
 
@@ -199,4 +200,4 @@ def back_up(scene: Scene) -> None:
         keeps = scene.satisfied[i] >= OPPONENTS
         if ours[i] and scene.reason[i] != STOPPED and (scene.moving[i] or not keeps):
             scene.reason[i] = BACKUP if keeps else BEST_EFFORT
-            scene.slack_m[i] = _slack_of(i, scene)
+            scene.slack_m[i] = slack_of(i, scene)

@@ -66,12 +66,14 @@ def set_required_margins(scene: Scene) -> None:
     """
     ours, boats, tuning, memory = scene.ours, scene.boats, scene.tuning, scene.memory
     for i in range(ours.shape[0]):
+        if not ours[i]:  # another group's are its own
+            continue
         scene.target[i] = 0.0
         scene.teammate_target_m[i] = 0.0
         scene.threat_target_m[i, :] = 0.0
         scene.joint_target_m[i] = 0.0
         scene.static_target_m[i] = 0.0
-        if ours[i] and memory[i, W.HAS_BACKUP] > 0.0:
+        if memory[i, W.HAS_BACKUP] > 0.0:
             decay, cap_m = boats.decay[i], boats.cap_m[i]
             scene.target[i] = _required_m(decay, memory[i, W.BACKUP_MARGIN], cap_m)
             scene.teammate_target_m[i] = _required_m(
@@ -86,11 +88,12 @@ def set_required_margins(scene: Scene) -> None:
 
 
 @lean_kernel
-def check_nominal(scene: Scene) -> bool:
-    """Check the nominal commands; return True when every boat still has its backup after them.
+def check_nominal(scene: Scene) -> None:
+    """Check the nominal commands: give every boat a manoeuvre after them, and score it.
 
     A command that is not usable (NaN, infinite, beyond `LARGEST_COMMAND`) becomes: hold course at zero speed. So does
-    the command of a boat for whose position a registered barrier reports nothing.
+    the command of a boat for whose position a registered barrier reports nothing. Boats that the hard line stops are
+    stopped from the start, so that the others are checked against their stops.
     """
     state, ours = scene.state, scene.ours
     n, nominal = state.shape[0], scene.nominal
@@ -108,14 +111,13 @@ def check_nominal(scene: Scene) -> bool:
         if not usable or unknown_at(i, scene) >= 0:
             scene.command[i, 0], scene.command[i, 1] = 0.0, 0.0
             scene.reason[i] = W.HELD
-        if beyond_line(i, scene):
+        if beyond_line(i, scene) or scene.last_resort[i] == W.MUST_STOP:
             scene.command[i, 0], scene.command[i, 1], scene.reason[i] = 0.0, 0.0, W.STOPPED
-            predict(i, scene.command, scene)
-            continue
-        apply_right_of_way(i, scene)
+        else:
+            apply_right_of_way(i, scene)
         predict(i, scene.command, scene)
         scene.checked_turn[i] = wrap_degrees(scene.next_state[i, L.HEADING] - state[i, L.HEADING])
     for i in range(n):
         copy_row(scene.checked[i], scene.command[i])
         scene.checked_reason[i] = scene.reason[i]
-    return assign_manoeuvres(scene, 1, ours)
+    assign_manoeuvres(scene, 1, ours)

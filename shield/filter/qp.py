@@ -30,7 +30,7 @@ from ..jit import Array, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..platforms.actuator import command_for_turn, full_turn
 from ..platforms.step import step_boat
-from ..workspace import BY_QP, LEAST_CHANGE, ROW_COST, Scene, all_spent
+from ..workspace import BY_QP, LEAST_CHANGE, ROW_COST, STOPPED, Scene, all_spent
 from .backup_switch import list_movers
 from .blend import LITTLE_M, SCORE, before_opponent, costs_at_most, note_verified, restore_verified, satisfies_all
 from .nominal import check
@@ -258,18 +258,25 @@ def among_mates(scene: Scene) -> bool:
 
 
 @lean_kernel
+def _may_change(i: int, scene: Scene) -> bool:
+    """Return whether boat i may be given another command than its backup, as far as itself is concerned."""
+    return satisfies_all(i, scene) and scene.reason[i] != STOPPED
+
+
+@lean_kernel
 def begin_program(scene: Scene) -> int:
     """Make nominal commands the candidate of boats that teammates block, and of these; return how many.
 
     Boats whose nominal command an opponent blocks, and boats whose backup violates something, stay on their backups.
+    Boats that the hard line stops stay stopped.
     """
     ours, moving = scene.ours, scene.moving
     moving[:] = False
     for i in range(ours.shape[0]):
         j = scene.violated[i]
-        if ours[i] and j >= 0 and ours[j] and satisfies_all(i, scene):
+        if ours[i] and j >= 0 and ours[j] and _may_change(i, scene):
             moving[i] = True
-            moving[j] = moving[j] or (satisfies_all(j, scene) and not before_opponent(j, scene))
+            moving[j] = moving[j] or (_may_change(j, scene) and not before_opponent(j, scene))
     count = list_movers(scene)
     for m in range(count):
         copy_row(scene.command[scene.movers[m]], scene.checked[scene.movers[m]])
