@@ -43,10 +43,11 @@ class Shield:
     teammates have kept each other from turning for seconds, see `right_of_way`). Otherwise, among teammates, it sends
     the least change that leaves every boat a backup,
 
-        minimise |u - u_nominal|^2   subject to   h(x+) >= exp(-alpha dt) h(x)   for every pair, edge and obstacle,
+        minimise |u - u_nominal|^2   subject to   h(x+) >= exp(-alpha dt) min(max(h, 0), cap),
 
-    where u is the turn and speed of this step, commanded through the autopilot. Against opponents it sends the backup;
-    along edges, as little of the backup as suffices.
+    and to the margins that the backups keep, for every pair, edge and obstacle. Here u is the turn and speed of this
+    step, commanded through the autopilot, and h on the right is remembered from the last plan. Against opponents it
+    sends the backup; along edges, as little of the backup as suffices.
 
     Between calls it remembers each boat's backup, its margins and the commands not yet in effect, for as long as the
     boat (name, platform, team) is in the fleet. The same inputs since `reset` give the same bits. It expects one call

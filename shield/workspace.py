@@ -199,7 +199,7 @@ class Scene(NamedTuple):
     driven: Annotated[Array, "n", 4]
     known: Annotated[BoolArray, "n"]  # boats whose way is predicted by what drives them, in ``path``
     adversary_horizon_s: Annotated[Array, "n"]  # time from now for which each opponent is adversarial
-    # required margins, m
+    # required margins, m: those of the nominal check, zero while backups are assigned, then those of `blend.verify`
     target: Annotated[Array, "n"]  # from boats that are not own
     teammate_target_m: Annotated[Array, "n"]  # from own boats
     threat_target_m: Annotated[Array, "n", "n"]  # from each pursuing opponent

@@ -58,9 +58,9 @@ def _required_m(decay: float, was_m: float, cap_m: float) -> float:
 def set_required_margins(scene: Scene) -> None:
     """Set the required margins: the discrete-time class-K condition h(x+) >= decay * min(h(x), cap), at least 0.
 
-    Each adversarial opponent has a required margin of its own. In a common one, a teammate's small but certain margin
-    would let it shrink at once. The margin from own teammates may shrink freely until it is small: their commands are
-    known.
+    Adversarial opponents have required margins of their own: one each for boats with value tables, one for all without.
+    In a common one, a teammate's small but certain margin would let them shrink at once. The margin from own teammates
+    may shrink freely until it is small: their commands are known.
 
     While a boat must hold its backup, the whole cap is required from each adversarial opponent.
     """
