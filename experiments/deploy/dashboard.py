@@ -223,10 +223,8 @@ def _in_foreground(descriptor: int) -> bool:
 
 
 REFRESH_HZ = 4.0
-LOG_LINES = 3
-"""Number of log lines on the screen."""
-LATE_OF = 100
-"""Number of latest ticks over which delays are shown."""
+LOG_LINES = 3  # number of log lines on the screen
+LATE_OF = 100  # number of latest ticks over which delays are shown
 
 
 class Dashboard:

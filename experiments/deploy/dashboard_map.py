@@ -18,8 +18,7 @@ from .referee import game_config
 
 _BITS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]], dtype=np.uint8)
 _BLANK = 0x2800
-COLOURS = ("bright_blue", "bright_red", "bright_white")
-"""Colours of blue, red and boats outside the game."""
+COLOURS = ("bright_blue", "bright_red", "bright_white")  # colours of blue, red and boats outside the game
 SYMBOLS = (
     ("small circle and line", "a boat in its team's colour, and the way it makes in 2 s"),
     ("large circle", "around a boat of ours: its separation radius, where nobody else should be"),
@@ -29,10 +28,8 @@ SYMBOLS = (
     ("⚑", "a flag, where it is now"),
 )
 """Drawn symbols, for the operator's page."""
-AHEAD_S = 2.0
-"""The line ahead of a boat is its way in this time, s."""
-MARGIN_M, FAR_M = 4.0, 60.0
-"""Margin around the map, m; boats further than `FAR_M` from the field are not fitted in."""
+AHEAD_S = 2.0  # the line ahead of a boat is its way in this time, s
+MARGIN_M, FAR_M = 4.0, 60.0  # margin around the map, m; boats further than `FAR_M` from the field are not fitted in
 
 
 class Canvas:

@@ -25,12 +25,9 @@ from steerclear.shield.fleet import Fleet
 from .dashboard_map import COLOURS, SYMBOLS, FieldMap
 from .plain import LINES
 
-MOST_ACTIONS = 6
-"""Most active responses shown as text."""
-LOOK_AHEAD_S = 60.0
-"""Later approaches are not shown, s."""
-SILENT_S = 1.0
-"""Time without a tick after which the loop is shown as standing still, s."""
+MOST_ACTIONS = 6  # most active responses shown as text
+LOOK_AHEAD_S = 60.0  # later approaches are not shown, s
+SILENT_S = 1.0  # time without a tick after which the loop is shown as standing still, s
 
 COLUMNS = {
     "boat": (10, "its name in its team's colour, and its marks"),

@@ -16,6 +16,7 @@ from typing import IO, BinaryIO
 
 from steerclear.experiments.sim_boats.demo import MOOS_PORTS, demo_text
 from steerclear.shield.bridge.blackbox import log_path
+from steerclear.shield.bridge.messages import Closing
 from steerclear.shield.compat import Self
 from steerclear.shield.exceptions import BridgeError
 
@@ -46,8 +47,7 @@ def end_with_parent(stream: BinaryIO | None = None) -> threading.Thread:
 FOLDER = Path("steerclear_demo")
 """Folder for demonstrations in the current folder; each has its own subfolder with fleet file and logs."""
 
-PORTS = (14550, 14700, 14701)
-"""Ports in the packaged fleet file: links, feed, referee."""
+PORTS = (14550, 14700, 14701)  # ports in the packaged fleet file: links, feed, referee
 
 
 def demo_file(folder: Path = FOLDER, link: str = "mavlink") -> Path:
@@ -71,11 +71,7 @@ def demo_file(folder: Path = FOLDER, link: str = "mavlink") -> Path:
 
 
 def free_ports(count: int) -> list[int]:
-    """Return different ports of this machine that are free for both UDP and TCP.
-
-    Raises:
-        OSError: there is none.
-    """
+    """Return different ports of this machine that are free for both UDP and TCP; `OSError` where there are none."""
     with contextlib.ExitStack() as stack:
         found: list[int] = []
         while len(found) < count:
@@ -95,7 +91,7 @@ def _new_folder(folder: Path) -> Path:
     raise BridgeError(f"{folder} is full of demonstrations; run it in another folder")
 
 
-class Demo:
+class Demo(Closing):
     """Simulated boats of a fleet file, opponents and a referee. A context manager.
 
     The processes end with this one, even if it is killed. Their output is stored beside the fleet file, whose links
@@ -124,11 +120,7 @@ class Demo:
         return ""
 
     def wait(self, timeout_s: float) -> None:
-        """Wait until the boats are simulated; the first time includes compilation.
-
-        Raises:
-            BridgeError: a process ended, or the boats did not start in time.
-        """
+        """Wait until the boats are simulated; `BridgeError` where a process ended, or they did not start in time."""
         end = time.monotonic() + timeout_s
         while "Simulated boats" not in self._said("boats"):
             if self.fault():
@@ -170,6 +162,3 @@ class Demo:
             what = f"the demonstration cannot be started ({error}); run sim-boats and referee by hand"
             raise BridgeError(what) from None
         return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()

@@ -11,21 +11,14 @@ from typing import NamedTuple
 
 
 class Figure(NamedTuple):
-    """One figure of a run.
+    """One figure of a run."""
 
-    Attributes:
-        key: in results.
-        meaning: with its unit, without a full stop.
-        label: text in the terminal's table; empty: not shown there.
-        factor, unit, digits: factor to the shown unit, that unit, and digits shown.
-    """
-
-    key: str
-    meaning: str
-    label: str = ""
-    factor: float = 1.0
-    unit: str = ""
-    digits: int = 0
+    key: str  # in results
+    meaning: str  # with its unit, without a full stop
+    label: str = ""  # text in the terminal's table; empty: not shown there
+    factor: float = 1.0  # to the shown unit
+    unit: str = ""  # the shown unit
+    digits: int = 0  # digits shown
 
 
 FIGURES = (

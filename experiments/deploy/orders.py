@@ -32,28 +32,19 @@ from .referee import game_config, game_obstacles
 
 LOG = logging.getLogger(__name__)
 
-VALID_S = 12.0 * 3600.0
-"""A drill is valid for this long, s: one day on the water."""
-DRILLED = ("course", "response", "model")
-"""Checks that only a drill performs."""
+VALID_S = 12.0 * 3600.0  # a drill is valid for this long, s: one day on the water
+DRILLED = ("course", "response", "model")  # checks that only a drill performs
 
 
 class Kept(BaseModel):
-    """A stored preflight.
-
-    Attributes:
-        fleet: fingerprint of the fleet file's text and its boats' platforms; what has changed needs a new drill.
-        unix_s: end time, s since 1970.
-        refused: names of checks neither passed nor accepted.
-        checks: all results.
-    """
+    """A stored preflight."""
 
     model_config = ConfigDict(strict=True, allow_inf_nan=False)
 
-    fleet: str
-    unix_s: float
-    refused: list[str]
-    checks: list[CheckResult]
+    fleet: str  # fingerprint of the file's text and its boats' platforms; what has changed needs a new drill
+    unix_s: float  # end time, s since 1970
+    refused: list[str]  # names of checks neither passed nor accepted
+    checks: list[CheckResult]  # all results
 
 
 def keep(fleet: FleetFile, text: str, boat: str | None, results: Sequence[CheckResult], refused: Sequence[str]) -> Path:
@@ -140,50 +131,31 @@ def _read(path: Path) -> Kept | None:
     return None
 
 
-LONGEST_MINUTES = 120.0
-"""Log duration for which disk space is required when the run has no end time."""
+LONGEST_MINUTES = 120.0  # log duration for which disk space is required when the run has no end time
 LONGEST_WAIT_S, FASTEST = 3600.0, 1000.0
 """Limits of the wait in s and of the simulated speed; larger values are taken for typing errors."""
 RENAMED_CHECKS = {"certificate": "backup"}
 """Old names that ``--accept`` took until 0.9 and still takes for one more release."""
-APART_M = 100.0
-"""Spacing of the boats in `boats_of`; large, because their positions do not matter there."""
+APART_M = 100.0  # spacing of the boats in `boats_of`; large, because their positions do not matter there
 
 
 @dataclass(frozen=True)
 class Orders:
-    """Settings of a run.
+    """Settings of a run; `ConfigError` where the speed or the wait is out of range."""
 
-    Attributes:
-        fleet_file: path of the FLEET.yaml.
-        policy: name or path, as `steerclear.policies.make` takes it.
-        boat: name of this process's boat (coordination per_boat); None: the whole team.
-        minutes: duration; None: until ended.
-        accept: names of checks that may fail.
-        seed: of the policy's random draws.
-        tlog: whether raw packets are also stored.
-        speed: factor of real time, for simulated boats that run at it.
-        connect_s: how long to wait for boats, s.
-        trust: also load a model stored among other teams' entries.
-        untold_delay_s: delay from command to effect if neither file, drill nor fit gives it, s; None: one step.
-        begun_unix_s: start time that names all files, s since 1970; None: when they are opened.
-
-    Raises:
-        ConfigError: the speed or the wait is out of range.
-    """
-
-    fleet_file: Path
-    policy: str
-    boat: str | None = None
-    minutes: float | None = None
-    accept: tuple[str, ...] = ()
-    seed: int = 0
-    tlog: bool = True
-    speed: float = 1.0
-    connect_s: float = CONNECT_S
-    trust: bool = False
+    fleet_file: Path  # path of the FLEET.yaml
+    policy: str  # name or path, as `steerclear.policies.make` takes it
+    boat: str | None = None  # name of this process's boat (coordination per_boat); None: the whole team
+    minutes: float | None = None  # duration; None: until ended
+    accept: tuple[str, ...] = ()  # names of checks that may fail
+    seed: int = 0  # of the policy's random draws
+    tlog: bool = True  # whether raw packets are also stored
+    speed: float = 1.0  # factor of real time, for simulated boats that run at it
+    connect_s: float = CONNECT_S  # how long to wait for boats, s
+    trust: bool = False  # also load a model stored among other teams' entries
+    # delay from command to effect if neither file, drill nor fit gives it, s; None: one step
     untold_delay_s: float | None = None
-    begun_unix_s: float | None = None
+    begun_unix_s: float | None = None  # start time that names all files, s since 1970; None: when they are opened
 
     def __post_init__(self) -> None:
         if not 0.0 < self.connect_s <= LONGEST_WAIT_S:
@@ -197,37 +169,23 @@ class Orders:
 
 @dataclass
 class Outcome:
-    """Result of a run.
+    """Result of a run."""
 
-    Attributes:
-        ended: why it ended.
-        refused: checks that prevented the start; no boat moved.
-        checks: results of all checks.
-        left: what each boat was left doing, and who was approaching it.
-        near: boats approaching one of the own boats at the end.
-        log: path of the black box; None if it never began.
-        figures: of the loop and its decisions.
-    """
-
-    ended: str = ""
-    refused: list[CheckResult] = field(default_factory=list)
-    checks: list[CheckResult] = field(default_factory=list)
-    left: tuple[str, ...] = ()
-    near: tuple[str, ...] = ()
-    log: Path | None = None
-    figures: dict[str, float] = field(default_factory=dict)
+    ended: str = ""  # why it ended
+    refused: list[CheckResult] = field(default_factory=list)  # checks that prevented the start; no boat moved
+    checks: list[CheckResult] = field(default_factory=list)  # results of all checks
+    left: tuple[str, ...] = ()  # what each boat was left doing, and who was approaching it
+    near: tuple[str, ...] = ()  # boats approaching one of the own boats at the end
+    log: Path | None = None  # path of the black box; None if it never began
+    figures: dict[str, float] = field(default_factory=dict)  # of the loop and its decisions
 
 
 @dataclass(frozen=True)
 class Surface:
-    """User interface of a run.
+    """User interface of a run."""
 
-    Attributes:
-        shown: called with each check's result.
-        sinks: makes further sinks, such as a dashboard, when the run begins.
-    """
-
-    shown: Callable[[CheckResult], None] = lambda result: None
+    shown: Callable[[CheckResult], None] = lambda result: None  # called with each check's result
+    # makes further sinks, such as a dashboard, when the run begins
     sinks: Callable[[FleetFile, Operator, Clock], Sequence[TickSink]] = lambda fleet, operator, clock: ()
 
 

@@ -12,8 +12,7 @@ from steerclear.shield.decision import Reason
 from steerclear.shield.fleet import Fleet
 from steerclear.shield.platforms import layout as L
 
-EVERY_S = 5.0
-"""Time between two lines, s."""
+EVERY_S = 5.0  # time between two lines, s
 LINES = {
     "time": ("{:6.0f} s", f"seconds since the first turn; a line every {EVERY_S:g} s"),
     "alone": ("no other boat", "nobody else is known: nothing to keep clear of"),

@@ -37,28 +37,19 @@ from .referee import game_config, stand_in_config
 NEED_NO_GAME = ("hold", "random", "waypoints")
 """Policies that use neither flags nor other boats; they can also steer boats that play no game."""
 NOBODY = -1
-RESTART_S = 1.0
-"""If the game clock goes back by more than this, a new game has begun, s."""
-FAILED = 3
-"""Exit status if the policy could not be loaded; the answer before it gives the reason."""
-GRACE_S = 5.0
-"""Time the supervisor has to end this process after the runner is gone, s."""
+RESTART_S = 1.0  # if the game clock goes back by more than this, a new game has begun, s
+FAILED = 3  # exit status if the policy could not be loaded; the answer before it gives the reason
+GRACE_S = 5.0  # time the supervisor has to end this process after the runner is gone, s
 
 
 @dataclass(frozen=True)
 class Cast:
-    """Assignment of a fleet's boats to the agents of a game.
-
-    Attributes:
-        names: all boats of the file, in its order.
-        rows: index in ``names`` of each agent's boat, agent_0 first; `NOBODY` for agents without a boat.
-        ours: agents that the policy plays.
-    """
+    """Assignment of a fleet's boats to the agents of a game."""
 
     config: GameConfig
-    names: tuple[str, ...]
-    rows: tuple[int, ...]
-    ours: tuple[str, ...]
+    names: tuple[str, ...]  # all boats of the file, in its order
+    rows: tuple[int, ...]  # index in ``names`` of each agent's boat, agent_0 first; `NOBODY` for agents without a boat
+    ours: tuple[str, ...]  # agents that the policy plays
 
     @property
     def players(self) -> tuple[str, ...]:
@@ -188,35 +179,21 @@ class Observer:
 
 @dataclass(frozen=True)
 class Orders:
-    """First message to the process, pickled.
+    """First message to the process, pickled."""
 
-    Attributes:
-        cast: boats and agents.
-        policy: name or path, as `steerclear.policies.make` takes it.
-        options: of the policy.
-        seed: of all random draws; the second game uses seed + 1, and so on.
-    """
-
-    cast: Cast
-    policy: str
-    options: Mapping[str, Any] = field(default_factory=dict)
-    seed: int = 0
+    cast: Cast  # boats and agents
+    policy: str  # name or path, as `steerclear.policies.make` takes it
+    options: Mapping[str, Any] = field(default_factory=dict)  # of the policy
+    seed: int = 0  # of all random draws; the second game uses seed + 1, and so on
 
 
 class Play(NamedTuple):
-    """A policy's answer to one snapshot; NaN: no usable answer, or a boat that this policy does not play.
+    """A policy's answer to one snapshot; NaN: no usable answer, or a boat that this policy does not play."""
 
-    Attributes:
-        relative: (n_agents, 2) command of each agent's boat: speed m/s, heading deg relative to its own.
-        driven: (n_agents,) game-controlled boats: tagged, or out of bounds.
-        commands: (n_boats, 2) the same for all boats of the file: speed m/s up to top speed, absolute heading rad.
-        problems: what was wrong with single boats' answers, a line each.
-    """
-
-    relative: Array
-    driven: Array
-    commands: Array
-    problems: tuple[str, ...] = ()
+    relative: Array  # (n_agents, 2) command of each agent's boat: speed m/s, heading deg relative to its own
+    driven: Array  # (n_agents,) game-controlled boats: tagged, or out of bounds
+    commands: Array  # (n_boats, 2) the same for all boats of the file: speed m/s up to top speed, absolute heading rad
+    problems: tuple[str, ...] = ()  # what was wrong with single boats' answers, a line each
 
 
 class Player:
@@ -292,11 +269,7 @@ class Player:
 
 
 def load_player(orders: Orders) -> Player:
-    """Return a warmed-up player; any exception of the policy becomes a `PolicyError`.
-
-    Raises:
-        PolicyError: the policy is unknown, cannot be loaded, or cannot play this game.
-    """
+    """Return a warmed-up player; `PolicyError` where the policy is unknown, does not load, or cannot play this game."""
     try:
         player = Player(orders)
         player.warm_up()

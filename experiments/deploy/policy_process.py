@@ -18,9 +18,8 @@ import numpy as np
 from steerclear.policies.registry import looks_like_path
 from steerclear.shield.bridge.clock import Clock, MonotonicClock
 from steerclear.shield.bridge.fleet_file import FleetFile
-from steerclear.shield.bridge.messages import Answer, Snapshot
+from steerclear.shield.bridge.messages import Answer, Closing, Snapshot
 from steerclear.shield.commands import Commands
-from steerclear.shield.compat import Self
 from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.jit import Array
 
@@ -29,17 +28,14 @@ from .worker import Broken, Worker
 
 logger = logging.getLogger(__name__)
 
-START_WITHIN_S = 120.0
-"""Time a policy has to load and to give its first answer, s."""
-SLOW_S = 0.3
-"""An answer that takes longer than this is reported as a fault, s."""
+START_WITHIN_S = 120.0  # time a policy has to load and to give its first answer, s
+SLOW_S = 0.3  # an answer that takes longer than this is reported as a fault, s
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.25, 10.0
 """First and longest pause before a dead policy is restarted, s; the pause doubles each time."""
-HEALTHY_S = 30.0
-"""After answering for this long, a policy's next restart uses the first pause again, s."""
+HEALTHY_S = 30.0  # after answering for this long, a policy's next restart uses the first pause again, s
 
 
-class PolicyProcess:
+class PolicyProcess(Closing):
     """A `WantedSource`: sends snapshots to a policy's process and returns its latest answer. A context manager.
 
     At most one snapshot is in flight; of later ones only the latest waits. A policy that dies or does not answer within
@@ -127,12 +123,6 @@ class PolicyProcess:
         for worker in self._ended:
             worker.wait(2.0)
         self._ended.clear()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def _turn(self) -> None:
         now_s, worker = time.monotonic(), self._worker

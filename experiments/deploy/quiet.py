@@ -32,12 +32,10 @@ LOOP_FIRST, OTHERS_FIRST = 2, 1
 """Real-time priorities of the loop's thread and of the runner's others, above all other programs, where allowed.
 
 Nice values are not enough: at a load where the loop waits 0.2 ms with these priorities, it waits 18 ms with those."""
-SWITCH_S = 0.0001
-"""How long another thread may hold the interpreter, s."""
+SWITCH_S = 0.0001  # how long another thread may hold the interpreter, s
 ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 """Signals that end a run in order; SIGHUP comes when a terminal or its connection is closed."""
-MOST_LINES = 10_000
-"""Most log lines waiting to be written; further ones are dropped."""
+MOST_LINES = 10_000  # most log lines waiting to be written; further ones are dropped
 
 
 def warm_up(fleet: FleetFile) -> None:

@@ -15,9 +15,8 @@ from steerclear.env.core import BatchedMctf
 from steerclear.shield.bridge.clock import Clock
 from steerclear.shield.bridge.feed import BoatStatus, FeedReceiver, FeedSender, FlagStatus, GameState
 from steerclear.shield.bridge.fleet_file import FleetFile
-from steerclear.shield.bridge.messages import Contact
+from steerclear.shield.bridge.messages import Closing, Contact
 from steerclear.shield.bridge.session import key_of
-from steerclear.shield.compat import Self
 from steerclear.shield.exceptions import ConfigError, FleetFileError, GameError
 from steerclear.shield.platforms import Platform
 from steerclear.shield.platforms import layout as L
@@ -31,8 +30,7 @@ FROM_FILE = {
     "dt_s": "rate_hz",
 }
 """Game settings that other keys of a fleet file give."""
-CARRY_S = 1.0
-"""Longest time for which a boat's last fix is extrapolated along its heading, s."""
+CARRY_S = 1.0  # longest time for which a boat's last fix is extrapolated along its heading, s
 SIDES = ("blue", "red")
 
 
@@ -190,13 +188,12 @@ def state_of(core: BatchedMctf, names: Sequence[str], note: str = "") -> GameSta
 
 
 RATE_HZ = 10.0
-LINGER_S = 3.0
-"""How long the end of a game is published, s."""
+LINGER_S = 3.0  # how long the end of a game is published, s
 Told = Callable[[GameState, Sequence[str]], None]
 """Called each time with the state of the game and what happened, a line each."""
 
 
-class Referee:
+class Referee(Closing):
     """Receives positions, applies the rules, and publishes the state of the game. A context manager.
 
     Of several senders for one boat, the one heard first counts while it still sends.
@@ -272,9 +269,3 @@ class Referee:
     def close(self) -> None:
         """Close the sockets; may be called again."""
         self._open.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()

@@ -21,22 +21,13 @@ from ..verdicts import judge_game
 from .proof import Difference, Proof, Prover
 from .tracks import TrackBuilder, Tracks, placed, record_of
 
-MOST_LINES = 200
-"""Most log lines in the report."""
-MOST_ROWS = 12
-"""Most rows of a table; the rest is only counted."""
+MOST_LINES = 200  # most log lines in the report
+MOST_ROWS = 12  # most rows of a table; the rest is only counted
 
 
 @dataclass
 class Replay:
-    """Result of a replay, see `keys.REPLAY`.
-
-    Attributes:
-        lines: warnings and errors in the log.
-        tracks: trajectories; None if not requested.
-        record: of the game, made from the tracks.
-        judged: closest distances, m, and separation violations with counts and verdicts; empty if not requested.
-    """
+    """Result of a replay, see `keys.REPLAY`."""
 
     header: LogHeader
     proof: Proof
@@ -47,10 +38,11 @@ class Replay:
     seconds: float
     reasons: Counter[str]
     actions: Counter[tuple[str, str, str]]
-    lines: list[LogLine]
+    lines: list[LogLine]  # warnings and errors in the log
     origin: list[str]
-    tracks: Tracks | None = None
-    record: Record | None = None
+    tracks: Tracks | None = None  # trajectories; None if not requested
+    record: Record | None = None  # of the game, made from the tracks
+    # closest distances, m, and separation violations with counts and verdicts; empty if not requested
     judged: dict[str, Any] = field(default_factory=dict)
 
     @property

@@ -51,8 +51,7 @@ from .sea_trial import SeaTrial, longest_s
 
 LOG = logging.getLogger(__name__)
 
-LOOK_S = 1.5
-"""How long boats are observed before their situation is judged, s."""
+LOOK_S = 1.5  # how long boats are observed before their situation is judged, s
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,7 @@ STEADY_S = 5.0
 EDGE_M, LOOK_S = 4.0, 2.5
 """A manoeuvre is aborted if the boat would come this near to the geofence, m, within this time, s."""
 ZIGZAG_DEG, ZIGZAG_LEGS = 20.0, 5
-CIRCLE_DEG, CARROT_DEG = 400.0, 75.0
-"""A turning circle is commanded as a heading this far ahead of the boat's."""
+CIRCLE_DEG, CARROT_DEG = 400.0, 75.0  # a turning circle is commanded as a heading this far ahead of the boat's
 HOME_SHARE = 0.6
 
 Wanted = tuple[float, float]

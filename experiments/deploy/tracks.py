@@ -21,12 +21,9 @@ from steerclear.shield.platforms import layout as L
 from steerclear.shield.tracks import fill_memory
 
 Array = NDArray[np.float64]
-GONE_S = 1.5
-"""A boat further than this from any fix in time counts as absent, s."""
-OFF_M = 1e6
-"""Position of absent boats, m; also the distance between them."""
-MOST_STEPS = 10_000_000
-"""Longest plausible log in steps, over ten days at 10 Hz; a longer one counts as damaged."""
+GONE_S = 1.5  # a boat further than this from any fix in time counts as absent, s
+OFF_M = 1e6  # position of absent boats, m; also the distance between them
+MOST_STEPS = 10_000_000  # longest plausible log in steps, over ten days at 10 Hz; a longer one counts as damaged
 _MATCH_S = 1e-6
 _SEEN = L.SPEED + 1
 _DECIDED = np.dtype(
@@ -38,39 +35,23 @@ _NOTHING = ((math.nan, math.nan), (math.nan, math.nan), int(Reason.NOT_COVERED),
 
 @dataclass(frozen=True)
 class Tracks:
-    """Trajectories and decisions at even time steps.
+    """Trajectories and decisions at even time steps."""
 
-    Attributes:
-        names: of the n boats, in the header's order; then others in order of appearance.
-        team: (n,) 0 blue, 1 red, 2 outside the game.
-        ours: (n,) bool, boats that this process commanded and its shield decided for.
-        platforms: names.
-        params: (n, N_PARAM) platform rows.
-        time_s: (T+1,) since the log began, s.
-        states: (T+1, n, N_STATE) with estimated controller memory; NaN where a boat was absent.
-        wanted, sent: (T, n, 2) nominal and filtered command: speed m/s and absolute heading rad in [0, 2 pi);
-            NaN where nothing was decided.
-        reason: (T, n); NOT_COVERED where nothing was decided.
-        intervened: (T, n) bool.
-        safety_margin_m: (T, n); NaN where nothing was decided.
-        games: (T,) state of the game at each step.
-        dt_s: step, s.
-    """
-
-    names: tuple[str, ...]
-    team: NDArray[np.int64]
-    ours: NDArray[np.bool_]
-    platforms: tuple[str, ...]
-    params: Array
-    time_s: Array
-    states: Array
+    names: tuple[str, ...]  # of the n boats, in the header's order; then others in order of appearance
+    team: NDArray[np.int64]  # (n,) 0 blue, 1 red, 2 outside the game
+    ours: NDArray[np.bool_]  # (n,) bool, boats that this process commanded and its shield decided for
+    platforms: tuple[str, ...]  # names
+    params: Array  # (n, N_PARAM) platform rows
+    time_s: Array  # (T+1,) since the log began, s
+    states: Array  # (T+1, n, N_STATE) with estimated controller memory; NaN where a boat was absent
+    # nominal and filtered command (T, n, 2): speed m/s and absolute heading rad in [0, 2 pi); NaN: nothing was decided
     wanted: Array
     sent: Array
-    reason: NDArray[np.int64]
-    intervened: NDArray[np.bool_]
-    safety_margin_m: Array
-    games: Sequence[Mapping[str, Any]]
-    dt_s: float
+    reason: NDArray[np.int64]  # (T, n); NOT_COVERED where nothing was decided
+    intervened: NDArray[np.bool_]  # (T, n) bool
+    safety_margin_m: Array  # (T, n); NaN where nothing was decided
+    games: Sequence[Mapping[str, Any]]  # (T,) state of the game at each step
+    dt_s: float  # step, s
 
     def marked(self, key: str) -> NDArray[np.bool_]:
         """Return (T, n): whether the referee's game state set this flag of a boat, such as "driven"."""
@@ -116,11 +97,7 @@ class TrackBuilder:
                 fixes.append((fixed_s, fleet.state[i].copy()))
 
     def finish(self) -> Tracks:
-        """Return the tracks.
-
-        Raises:
-            LogError: the log has fewer than two ticks, no boats, or implausible times.
-        """
+        """Return the tracks; `LogError` where the log has fewer than two ticks, no boats, or implausible times."""
         names = tuple(name for name, fixes in self._fixes.items() if fixes)
         if len(self._times) < 2 or not names:
             raise LogError("the log holds no two ticks with boats; there is nothing to draw or judge")

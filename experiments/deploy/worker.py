@@ -21,10 +21,8 @@ from steerclear.shield.foreign import plain_text
 
 from ..entries.sandbox import OVER, READY, Limits, end_group, end_marked, is_stopped
 
-HEAD = struct.Struct("!i")
-"""Header of a message, as `multiprocessing.connection`, used at the other end, writes it."""
-MAX_BYTES = 1 << 20
-"""Longest valid message."""
+HEAD = struct.Struct("!i")  # header of a message, as `multiprocessing.connection`, used at the other end, writes it
+MAX_BYTES = 1 << 20  # longest valid message
 GONE = "the other end is gone"
 SUPERVISE = """import sys
 sys.path[:] = filter(None, sys.path)
@@ -35,10 +33,8 @@ sys.exit(main(sys.argv[1:]))
 PART = "steerclear.experiments.deploy.player"
 DEPLOY_LIMITS = Limits(written_bytes=None, output_bytes=None, gives_way=True, network=True)
 """Limits of a policy; without totals, since it may play for days."""
-TAIL_BYTES = 4096
-"""How much of the policy's printed output is stored."""
-SUPERVISOR_S, GONE_S = 5.0, 10.0
-"""Time a supervisor has to end its child, and any ended process has to disappear, s."""
+TAIL_BYTES = 4096  # how much of the policy's printed output is stored
+SUPERVISOR_S, GONE_S = 5.0, 10.0  # time a supervisor has to end its child, and any ended process has to disappear, s
 SINGLE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 

@@ -15,21 +15,16 @@ from steerclear.shield.platforms.files import PlatformFile
 from .models import MODELS, Model, Seen, distance_m, errors_of
 from .runs import STEP_S, FitError, Run
 
-EVERY, AHEAD, PICKED = 10, 60, 6
-"""Steps between windows, their length, and the interval of the compared steps."""
-WEIGHTS = np.array([1.0, 1.0, 0.02, 0.5])
-"""Weights of x, y (1/m), heading (1/deg) and speed (s/m)."""
-SOFT = 0.5
-"""Scale of the robust loss: larger weighted residuals count less, so that outliers do not dominate the fit."""
+EVERY, AHEAD, PICKED = 10, 60, 6  # steps between windows, their length, and the interval of the compared steps
+WEIGHTS = np.array([1.0, 1.0, 0.02, 0.5])  # weights of x, y (1/m), heading (1/deg) and speed (s/m)
+SOFT = 0.5  # scale of the robust loss: larger weighted residuals count less, so that outliers do not dominate the fit
 DELAYS_S = np.arange(0.025, 0.8, 0.05)
 BEGUN, MOST, HELD = 8, 50, 12
 """Evaluations (each with its derivatives) of every first guess, of the best of them, and of fits for held-out runs."""
-FOLDS = 3
-"""Cross-validation folds within each kind of run; a fit to the other folds predicts each."""
+FOLDS = 3  # cross-validation folds within each kind of run; a fit to the other folds predicts each
 AHEAD_S = (1.0, 3.0, 6.0)
 COVERED = 0.99
-JUDGED_EVERY = 3
-"""Steps between the moments from which a run is predicted."""
+JUDGED_EVERY = 3  # steps between the moments from which a run is predicted
 DIGITS, CHOSEN_BY = 4, 0.9
 WORST_M = 3.0
 """If the median held-out error 3 s ahead exceeds this, the log is not of one boat obeying these commands, m."""
@@ -89,21 +84,14 @@ def _least(model: Model, runs: Sequence[Run], top_mps: float, start: Array, most
 
 @dataclass(frozen=True)
 class Judged:
-    """A fit and its errors, by run.
+    """A fit and its errors, by run."""
 
-    Attributes:
-        fit: to all runs.
-        seen: extremes that the boat reached.
-        runs: all of them.
-        errors_m: per run (windows, 3) distances at `AHEAD_S` between predicted and seen position; NaN past its end.
-        held_out: per run whether it was predicted by a fit without it.
-    """
-
-    fit: Fit
-    seen: Seen
-    runs: Sequence[Run]
+    fit: Fit  # to all runs
+    seen: Seen  # extremes that the boat reached
+    runs: Sequence[Run]  # all of them
+    # per run (windows, 3) distances at `AHEAD_S` between predicted and seen position; NaN past its end
     errors_m: Sequence[Array]
-    held_out: Sequence[bool]
+    held_out: Sequence[bool]  # per run whether it was predicted by a fit without it
 
     def errors_of(self, column: int, chosen: Callable[[int], bool]) -> Array:
         """Return errors at one of `AHEAD_S` for the chosen run numbers, m."""
@@ -174,11 +162,7 @@ def best_of(found: dict[str, Judged]) -> str:
 
 
 def platform_file(judged: Judged, name: str) -> PlatformFile:
-    """Return the platform file of a fit.
-
-    Raises:
-        FitError: no model predicts the log, or the fitted platform cannot be steered.
-    """
+    """Return the platform file of a fit; `FitError` where it does not predict the log, or cannot be steered."""
     worst = judged.quantile_m(1, 0.5)
     if worst > WORST_M:
         raise FitError(

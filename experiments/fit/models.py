@@ -44,8 +44,7 @@ _USV = (
 HELD_S, HELD_MPS, FASTER_MPS = 2.0, 0.06, 0.25
 """A boat at top speed holds it this long, s, within this range, m/s, though commanded this much faster, m/s."""
 
-SLOW_SHARE = 0.2
-"""Share of top speed below which a boat counts as nearly at rest."""
+SLOW_SHARE = 0.2  # share of top speed below which a boat counts as nearly at rest
 
 Bound = tuple[str, float, float, float]
 
@@ -154,11 +153,7 @@ class Model:
         return {name: float(value) for (name, *_), value in zip(self.bounds, vector, strict=True)}
 
     def platform(self, vector: Array, name: str, top_mps: float, proved: bool = False) -> Platform:
-        """Return the platform of a vector; unless ``proved`` it need not be steerable.
-
-        Raises:
-            PlatformError: ``proved``, and it cannot be steered.
-        """
+        """Return the platform of a vector; if ``proved``, `PlatformError` where it cannot be steered."""
         with contextlib.nullcontext() if proved else reference_models():
             return self.build(self.values(vector), name, top_mps)
 

@@ -31,8 +31,7 @@ BIN_NAMES = dict(zip(NEEDED, ("POS", "POS", "ATT.Yaw", "GPS.Spd", "THR.DesSpeed"
 BIN_FIELDS = {name.partition(".")[0]: (what, name.partition(".")[2]) for what, name in BIN_NAMES.items() if "." in name}
 MASK_IGNORES_RATES, MASK_VELOCITY_ONLY = 7, 3527
 NO_HEADING, FIX_3D = 65535, 3
-LONGEST_RUN_S = 30.0
-"""Longer runs are cut into pieces, so that some can be held out."""
+LONGEST_RUN_S = 30.0  # longer runs are cut into pieces, so that some can be held out
 FEWEST_RUNS, FEWEST_TURNING_DEG, FEWEST_SPEED_MPS = 3, 20.0, 0.3
 CHANGED_SHARE = 0.4
 """A stop, or a start, is seen where the boat's speed changes by so much of its top speed while it is told to."""
@@ -47,10 +46,8 @@ COLUMNS: dict[str, tuple[str, tuple[str, ...]]] = {
 }
 """Columns of a CSV of steps: in words, and the names that each may have."""
 MOOS_NAMES = ("NAV_X", "NAV_Y", "NAV_HEADING", "NAV_SPEED", "DESIRED_SPEED", "DESIRED_HEADING")
-VARIABLES = dict(zip(MOOS_NAMES, NEEDED, strict=True))
-"""Of MOOS-IvP."""
-HELM_HOLDS_S = 5.0
-"""The helm of MOOS-IvP posts desired values when they change, and at least this often."""
+VARIABLES = dict(zip(MOOS_NAMES, NEEDED, strict=True))  # of MOOS-IvP
+HELM_HOLDS_S = 5.0  # the helm of MOOS-IvP posts desired values when they change, and at least this often
 
 
 def read_logs(
@@ -303,11 +300,7 @@ def _messages(path: Path) -> Iterator[Any]:
 
 
 def _check_enough(runs: Sequence[Run], pieces: int) -> None:
-    """See that the boat turned, stopped and started.
-
-    Raises:
-        FitError: it did not; the text says what to drive.
-    """
+    """See that the boat turned, stopped and started, else `FitError`, whose text says what to drive."""
     remedy = "drive a sea-trial and give its log"
     if pieces < FEWEST_RUNS:
         raise FitError(f"the logs hold {pieces} runs, fewer than {FEWEST_RUNS}; {remedy}")

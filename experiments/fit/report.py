@@ -23,11 +23,7 @@ AHEAD_STEPS, EVERY_STEPS, RUNS = 60, 30, 4
 
 
 def draw(judged: Judged, name: str, path: Path) -> None:
-    """Draw a fit: some runs as seen and as predicted, and the errors over the time ahead.
-
-    Raises:
-        OSError: it cannot be written.
-    """
+    """Draw some runs as seen and as predicted, and the errors ahead; `OSError` where it cannot be written."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11, 7), layout="constrained")

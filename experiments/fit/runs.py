@@ -12,43 +12,31 @@ import numpy as np
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array
 
-STEP_S = 0.1
-"""Step of the grid and of the model, s."""
-SHORTEST_S = 3.0
-"""Shorter runs tell nothing."""
-RATE_STEPS = 2
-"""Turn rates are taken over so many steps."""
+STEP_S = 0.1  # step of the grid and of the model, s
+SHORTEST_S = 3.0  # shorter runs tell nothing
+RATE_STEPS = 2  # turn rates are taken over so many steps
 FASTEST_MPS = 40.0
 JUMP_M, JUMP_SHARE = 1.5, 1.5
 """A position that moves farther in a step than so many metres and so many times the top speed's way has jumped."""
-WINDOW_STEPS = 20
-"""Ways are compared over so many steps."""
+WINDOW_STEPS = 20  # ways are compared over so many steps
 CHUNK_S, LEAST_WAY_M = 12.0, 5.0
 """A log is judged in stretches of about this length, s, in which the boat made at least this way."""
-MOST_BAD = 0.5
-"""A log of which more than this share, by time under way, contradicts itself is refused as a whole."""
-WAY_RATIO = (0.65, 1.55)
-"""The way by speeds over the way by positions: a current explains no more than this."""
-OFF_DEG = 30.0
-"""Median angle from heading to course beyond which a heading is another quantity, deg."""
-UNITS = {"knots": 1.944, "mph": 2.237, "ft/s": 3.281, "km/h": 3.6, "cm/s": 100.0}
-"""Speeds of 1 m/s in other units."""
+MOST_BAD = 0.5  # a log of which more than this share, by time under way, contradicts itself is refused as a whole
+WAY_RATIO = (0.65, 1.55)  # the way by speeds over the way by positions: a current explains no more than this
+OFF_DEG = 30.0  # median angle from heading to course beyond which a heading is another quantity, deg
+UNITS = {"knots": 1.944, "mph": 2.237, "ft/s": 3.281, "km/h": 3.6, "cm/s": 100.0}  # speeds of 1 m/s in other units
 SPENT_S = 1.0
 """A command not repeated for this long is no longer in force, s; a run ends where nothing was seen for so long."""
 SET_BACK_S = 0.2
 """A log whose time falls by more than this had its clock set back, s; less is the order in which messages came."""
-SELDOM_S = 0.25
-"""Commands that were only looked at every so many seconds or less often tell no delay."""
-SAME_S = 1e-4
-"""Times closer together are the same, s."""
-UNKNOWN_HEADINGS = (655.35, 65535.0)
-"""What MAVLink writes for a heading that is not known, deg."""
+SELDOM_S = 0.25  # commands that were only looked at every so many seconds or less often tell no delay
+SAME_S = 1e-4  # times closer together are the same, s
+UNKNOWN_HEADINGS = (655.35, 65535.0)  # what MAVLink writes for a heading that is not known, deg
 SEEN, TOLD = ("x", "y", "heading", "speed"), ("told_speed", "told_heading")
 WORDS = ("positions", "positions", "headings", "speeds", "speeds commanded", "headings commanded")
 NEEDED = dict(zip((*SEEN, *TOLD), WORDS, strict=True))
 
-Tell = Callable[[str], None]
-"""Is told in a sentence what of a log is left out, and why."""
+Tell = Callable[[str], None]  # is told in a sentence what of a log is left out, and why
 
 
 def untold(words: str) -> None:
@@ -67,19 +55,13 @@ def spans(mask: Any) -> list[tuple[int, int]]:
 
 @dataclass(frozen=True)
 class Run:
-    """One run of k steps.
+    """One run of k steps."""
 
-    Attributes:
-        name: of the log it is from.
-        begin_s: time of its first step in the log, s.
-        seen: (k, 5) x m, y m, heading deg (unwrapped, clockwise from the y axis), speed m/s, turn rate deg/s.
-        told: (k, 2) speed m/s and heading deg (unwrapped) commanded at each step.
-    """
-
-    name: str
-    begin_s: float
+    name: str  # of the log it is from
+    begin_s: float  # time of its first step in the log, s
+    # (k, 5) x m, y m, heading deg (unwrapped, clockwise from the y axis), speed m/s, turn rate deg/s
     seen: Array = field(repr=False)
-    told: Array = field(repr=False)
+    told: Array = field(repr=False)  # (k, 2) speed m/s and heading deg (unwrapped) commanded at each step
 
     @classmethod
     def of(cls, name: str, begin_s: float, seen: Array, told: Array) -> Run:
@@ -120,11 +102,7 @@ class Run:
 
 
 def consistent(name: str, runs: Sequence[Run], tell: Tell) -> list[Run]:
-    """Cut out of a log's runs what contradicts the rest, and tell it.
-
-    Raises:
-        FitError: the log contradicts itself as a whole.
-    """
+    """Cut out of a log's runs what contradicts the rest, and tell it; `FitError` where all of it does."""
     top_mps = max((float(np.abs(run.seen[:, 3]).max()) for run in runs), default=0.0)
     if top_mps > FASTEST_MPS:
         raise FitError(f"{name}: a speed of {top_mps:.0f} m/s is no boat's; give speeds in m/s")

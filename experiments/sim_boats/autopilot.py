@@ -24,22 +24,15 @@ ACCEPTED, DENIED = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED
 UNSUPPORTED, FAILED = mavlink.MAV_RESULT_UNSUPPORTED, mavlink.MAV_RESULT_FAILED
 
 _TEXT_BYTES = 50
-_FORCE = 21196.0
-"""Second parameter of an arming command that skips the checks."""
+_FORCE = 21196.0  # second parameter of an arming command that skips the checks
 _VELOCITY_ONLY, _LOCAL_FRAMES = 3527, (1, 7)
 _ATTITUDE_RATE_IGNORED, _THRUST_IGNORED = 4, 64
 
 
 class Autopilot:
-    """One boat behind MAVLink, read and written by the runner's own codec.
+    """One boat behind MAVLink, read and written by the runner's own codec; ``down``: radio to the commander.
 
-    Args:
-        system_id: its MAVLink system id.
-        settings: how it behaves.
-        frame: where the field is.
-        snapshot: its state at the start.
-        down: radio to the commander.
-        key: signing key of 32 bytes; None: packets are not signed and any is accepted.
+    Without a signing key of 32 bytes packets are not signed and any is accepted.
 
     Attributes:
         vehicle: its logic.

@@ -32,14 +32,7 @@ class Setting:
 
 
 class Boat:
-    """One boat.
-
-    Args:
-        spec: who it is.
-        start: x m, y m, heading deg.
-        system_id: of its autopilot.
-        setting: what all boats share.
-        seed: of its random numbers.
+    """One boat; it starts at x m, y m, heading deg.
 
     Attributes:
         hull, autopilot, faults: its parts.

@@ -52,8 +52,7 @@ def off_platform(platform: Platform, share: float, boat: str, seed: int) -> Plat
 
 NAME = "demo_fleet.yaml"
 LINKS = ("mavlink", "moos")
-MOOS_PORTS = (9001, 9002, 9003)
-"""Ports of the own boats' MOOSDBs in the file for MOOS."""
+MOOS_PORTS = (9001, 9002, 9003)  # ports of the own boats' MOOSDBs in the file for MOOS
 
 
 def demo_text(link: str = "mavlink") -> str:

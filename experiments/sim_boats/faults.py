@@ -30,26 +30,16 @@ Change = Callable[[Snapshot, float], Snapshot]
 
 @dataclass(frozen=True)
 class Fault:
-    """An active fault; its kind determines which parts it has.
+    """An active fault; its kind determines which parts it has."""
 
-    Attributes:
-        ends_s: when it ends by itself; inf: when it is cleared.
-        down, up: effect on packets to and from the commander.
-        change: effect on the autopilot's measurements.
-        dark: the autopilot is off.
-        hidden: the position feed leaves the boat out.
-        feed_late_s: delay of the boat's positions in the feed.
-        compass_off_rad: compass error, clockwise.
-    """
-
-    ends_s: float = math.inf
-    down: Bend | None = None
-    up: Bend | None = None
-    change: Change | None = None
-    dark: bool = False
-    hidden: bool = False
-    feed_late_s: float = 0.0
-    compass_off_rad: float = 0.0
+    ends_s: float = math.inf  # when it ends by itself; inf: when it is cleared
+    down: Bend | None = None  # effect on packets to and from the commander
+    up: Bend | None = None  # effect on packets to and from the commander
+    change: Change | None = None  # effect on the autopilot's measurements
+    dark: bool = False  # the autopilot is off
+    hidden: bool = False  # the position feed leaves the boat out
+    feed_late_s: float = 0.0  # delay of the boat's positions in the feed
+    compass_off_rad: float = 0.0  # compass error, clockwise
 
 
 class Faults:
@@ -71,11 +61,7 @@ class Faults:
         self._combine()
 
     def start(self, kind: str, now_s: float, duration_s: float = math.inf, **options: Any) -> None:
-        """Begin a fault, see `KINDS`.
-
-        Raises:
-            ConfigError: an unknown kind or option, or an option that cannot be used.
-        """
+        """Begin a fault, see `KINDS`; `ConfigError` for an unknown kind or option, or one that cannot be used."""
         check_kind(kind)
         try:
             fault = KINDS[kind](self, **options)
@@ -258,11 +244,7 @@ class Incident:
 
 
 def parse_incident(text: str) -> Incident:
-    """Parse a planned fault, such as ``blue_1:jump@60+10,distance_m=30``.
-
-    Raises:
-        ConfigError: it is malformed, or of an unknown kind.
-    """
+    """Parse a fault such as ``blue_1:jump@60+10,distance_m=30``; `ConfigError` where it is malformed or unknown."""
     found = _FORM.fullmatch(text.strip())
     if found is None:
         raise ConfigError(f"cannot read the fault {text!r}; give BOAT:KIND@SECONDS or BOAT:KIND@SECONDS+DURATION")
@@ -277,11 +259,7 @@ def parse_incident(text: str) -> Incident:
 
 
 class Plan:
-    """Planned faults in order of time.
-
-    Raises:
-        ConfigError: a boat is not simulated; from `look`, a fault has no such option.
-    """
+    """Planned faults in order of time; `ConfigError` where a boat is not simulated, or a fault has no such option."""
 
     def __init__(self, incidents: Iterable[Incident], fleet: SimFleet) -> None:
         self._waiting = sorted(incidents, key=lambda incident: incident.at_s)

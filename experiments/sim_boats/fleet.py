@@ -19,6 +19,7 @@ from steerclear.shield.bridge.clock import Clock, MonotonicClock
 from steerclear.shield.bridge.fleet_file import FleetFile, load_fleet
 from steerclear.shield.bridge.fleet_settings import MoosLinkSettings
 from steerclear.shield.bridge.frame import FieldFrame
+from steerclear.shield.bridge.messages import Closing
 from steerclear.shield.bridge.session import key_of
 from steerclear.shield.compat import Self
 from steerclear.shield.exceptions import ConfigError
@@ -34,12 +35,10 @@ from .world import Approach, PositionHub, TruthRecord, World, record_of
 
 LOG = logging.getLogger(__name__)
 
-TICK_S = 0.02
-"""Interval at which autopilots check their clocks and send telemetry, s."""
+TICK_S = 0.02  # interval at which autopilots check their clocks and send telemetry, s
 _TICKS_PER_STEP = round(STEP_S / TICK_S)
 _APART_M = 6.0
-_LONGEST_LAG_S = 1.0
-"""Largest lag behind the clock, s. Beyond it the fleet skips the lost time instead of catching up."""
+_LONGEST_LAG_S = 1.0  # largest lag behind the clock, s. Beyond it the fleet skips the lost time instead of catching up
 _LONGEST_WAIT_S = 0.1
 """Longest wait for packets, in wall-clock seconds; bounds the time until `SimFleet.close` is noticed."""
 
@@ -75,56 +74,34 @@ def boats_of(fleet: FleetFile, opponents: str, hulls: Hulls | None = None) -> li
 
 @dataclass(frozen=True)
 class SimSettings:
-    """Settings of a simulated fleet.
+    """Settings of a simulated fleet; `ConfigError` where the noise is out of range."""
 
-    Attributes:
-        origin: latitude and longitude of the field's corner, deg.
-        y_axis_deg: true course of the field's y axis, deg.
-        speed: factor of real time, for all rates and the autopilots' clocks.
-        clock: replaces the clock made from ``speed``.
-        autopilot: behaviour of the autopilots; `AutopilotSettings(boot_s=0.0)` is ready at once.
-        water: wind and current.
-        radio: loss and delay.
-        noise: scale of the sensor noise: 0 none, 1 as measured.
-        seed: of all random draws.
-        key: 32-byte key for MAVLink 2 signing and for authenticating the feed; None: neither.
-        preset: rules of the game, which is played if there are as many red boats as blue ones.
-        rules: game settings that override the preset's.
-        feed_to: HOST:PORT of each listener of the position feed.
-        record: whether to record the game, see `SimFleet.truth_record`.
-        separation_m: distance that counts as a separation violation in the record, m.
-        waits: whether policies wait until the other boats are commanded.
-        random_start: draw start positions from ``seed`` instead of using the game's fixed ones.
-        allow_remote: whether links may leave this machine.
-
-    Raises:
-        ConfigError: the noise is out of range.
-    """
-
-    origin: tuple[float, float] = (42.0, -71.0)
-    y_axis_deg: float = 0.0
-    speed: float = 1.0
-    clock: Clock | None = None
+    origin: tuple[float, float] = (42.0, -71.0)  # latitude and longitude of the field's corner, deg
+    y_axis_deg: float = 0.0  # true course of the field's y axis, deg
+    speed: float = 1.0  # factor of real time, for all rates and the autopilots' clocks
+    clock: Clock | None = None  # replaces the clock made from ``speed``
+    # behaviour of the autopilots; `AutopilotSettings(boot_s=0.0)` is ready at once
     autopilot: AutopilotSettings = field(default_factory=AutopilotSettings)
-    water: Water = field(default_factory=Water)
-    radio: RadioSettings = field(default_factory=RadioSettings)
-    noise: float = 0.0
-    seed: int = 0
-    key: bytes | None = None
+    water: Water = field(default_factory=Water)  # wind and current
+    radio: RadioSettings = field(default_factory=RadioSettings)  # loss and delay
+    noise: float = 0.0  # scale of the sensor noise: 0 none, 1 as measured
+    seed: int = 0  # of all random draws
+    key: bytes | None = None  # 32-byte key for MAVLink 2 signing and for authenticating the feed; None: neither
+    # rules of the game, which is played if there are as many red boats as blue ones
     preset: str | GameConfig = "aamas2024"
-    rules: Mapping[str, Any] = field(default_factory=dict)
-    feed_to: Sequence[str] = ()
-    record: bool = False
-    separation_m: float = DEFAULT_SEPARATION_M
-    waits: bool = True
-    random_start: bool = False
-    allow_remote: bool = False
+    rules: Mapping[str, Any] = field(default_factory=dict)  # game settings that override the preset's
+    feed_to: Sequence[str] = ()  # HOST:PORT of each listener of the position feed
+    record: bool = False  # whether to record the game, see `SimFleet.truth_record`
+    separation_m: float = DEFAULT_SEPARATION_M  # distance that counts as a separation violation in the record, m
+    waits: bool = True  # whether policies wait until the other boats are commanded
+    random_start: bool = False  # draw start positions from ``seed`` instead of using the game's fixed ones
+    allow_remote: bool = False  # whether links may leave this machine
 
     def __post_init__(self) -> None:
         check_bounds(self, noise=(0.0, 100.0))
 
 
-class SimFleet:
+class SimFleet(Closing):
     """Simulated boats. As a context manager, it starts the thread on entry and releases all resources on exit.
 
     Simulated time starts at 0 and is counted in seconds of ``clock``. Policies start to steer their boats once all
@@ -312,9 +289,6 @@ class SimFleet:
     def __enter__(self) -> Self:
         self.start()
         return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def boat(self, name: str) -> Boat:
         """Return the boat of that name."""

@@ -21,8 +21,7 @@ from steerclear.shield.platforms import layout as L
 from .hull import STEP_S, Bear
 from .settings import SimBoat
 
-Place = tuple[float, float, float]
-"""x m, y m, heading deg."""
+Place = tuple[float, float, float]  # x m, y m, heading deg
 _SEEN = (L.X, L.Y, L.HEADING, L.SPEED)
 
 
@@ -80,11 +79,7 @@ def start_places(boats: Sequence[SimBoat], config: GameConfig | None, random_see
 
 
 class Game:
-    """Rules and scripted players (``players``: number to policy) for boats moved elsewhere, blue first.
-
-    Raises:
-        ConfigError: a policy is not a scripted one.
-    """
+    """Rules and scripted players (number to policy, else `ConfigError`) for boats moved elsewhere, blue first."""
 
     def __init__(self, config: GameConfig, players: Mapping[int, str], seed: int) -> None:
         self.env, self.players, self._seed = MctfEnv(config), dict(players), seed

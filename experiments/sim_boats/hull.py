@@ -20,15 +20,11 @@ from steerclear.shield.platforms.usv import advance_hull, wrap_degrees
 
 from .settings import Water
 
-STEP_S = 0.1
-"""Step for which the platforms are defined, s."""
-AT_REST_MPS = 0.05
-"""Below this a boat may change over between ahead and astern, m/s."""
-_BACK_UP_PER_S = 0.17
-"""Speed of backing up per metre still to go: with 2 m it begins at the measured 0.34 m/s."""
+STEP_S = 0.1  # step for which the platforms are defined, s
+AT_REST_MPS = 0.05  # below this a boat may change over between ahead and astern, m/s
+_BACK_UP_PER_S = 0.17  # speed of backing up per metre still to go: with 2 m it begins at the measured 0.34 m/s
 _BACK_UP_ENDS_M, _RETURN_BEYOND_M, _RETURNED_M, _RETURN_SPEED_MPS = 0.1, 3.0, 1.0, 0.5
-_GUST_S = 5.0
-"""Gusts forget themselves over this time."""
+_GUST_S = 5.0  # gusts forget themselves over this time
 
 
 @dataclass(frozen=True)

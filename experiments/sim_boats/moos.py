@@ -17,8 +17,7 @@ from .hull import STEP_S, Actuate, Coast, Order, Steer
 from .sensing import Snapshot
 
 SIMULATOR, PID, REPORTER, RELAY = "uSimMarine", "pMarinePID", "pNodeReporter", "uFldNodeComms"
-REPORT_S, NAV_S = 0.5, 0.1
-"""Between NODE_REPORTs, and between NAV_*, simulated s."""
+REPORT_S, NAV_S = 0.5, 0.1  # between NODE_REPORTs, and between NAV_*, simulated s
 LOOPBACK = "127.0.0.1"
 
 

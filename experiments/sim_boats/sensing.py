@@ -23,29 +23,18 @@ _TURN_RATE_RADS = 0.003
 
 @dataclass(frozen=True)
 class Snapshot:
-    """Sensor readings of one boat at one time, in the field's frame and in geodetic coordinates.
+    """Sensor readings of one boat at one time, in the field's frame and in geodetic coordinates."""
 
-    Attributes:
-        time_s: simulated time of measurement, s.
-        x_m, y_m: m.
-        latitude_deg, longitude_deg: deg.
-        velocity_mps: over ground along the field's axes, m/s.
-        heading_rad: of the bow, clockwise from the field's y axis.
-        speed_mps: along the bow over ground, negative astern, m/s.
-        turn_rate_rads: clockwise.
-        has_fix: whether the position is from GPS; else it is dead reckoning.
-    """
-
-    time_s: float
-    x_m: float
-    y_m: float
-    latitude_deg: float
-    longitude_deg: float
-    velocity_mps: tuple[float, float]
-    heading_rad: float
-    speed_mps: float
-    turn_rate_rads: float
-    has_fix: bool = True
+    time_s: float  # simulated time of measurement, s
+    x_m: float  # m
+    y_m: float  # m
+    latitude_deg: float  # deg
+    longitude_deg: float  # deg
+    velocity_mps: tuple[float, float]  # over ground along the field's axes, m/s
+    heading_rad: float  # of the bow, clockwise from the field's y axis
+    speed_mps: float  # along the bow over ground, negative astern, m/s
+    turn_rate_rads: float  # clockwise
+    has_fix: bool = True  # whether the position is from GPS; else it is dead reckoning
 
     def moved_to(self, frame: FieldFrame, x_m: float, y_m: float) -> Snapshot:
         """Return the snapshot moved to another position in the field, m."""

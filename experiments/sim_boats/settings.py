@@ -8,8 +8,7 @@ from dataclasses import dataclass, field
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import Platform
 
-FREE = ""
-"""Address of a boat that picks a free port itself."""
+FREE = ""  # address of a boat that picks a free port itself
 _MOST = 1e9
 
 
@@ -23,51 +22,36 @@ def check_bounds(settings: object, **bounds: tuple[float, float]) -> None:
 
 @dataclass(frozen=True)
 class SimBoat:
-    """One simulated boat.
+    """One simulated boat."""
 
-    Attributes:
-        name: its name.
-        platform: dynamics, a name or a `Platform`.
-        team: 0 blue, 1 red.
-        system_id: MAVLink system id; 0: position in the list + 1.
-        address: its link, as the runner opens it: ``udpin:HOST:PORT`` (the boat sends there),
-            ``udpout:HOST:PORT`` (the boat listens there), ``tcp:HOST:PORT`` (the boat is the server),
-            ``tcpin:HOST:PORT`` (the boat connects); `FREE`: ``udpout`` with a free port; None: no link.
-        policy: scripted policy that steers the boat while nobody commands it by its link; empty: without commands it
-            stays where it is.
-        start: x m, y m, heading deg in the field; None: the game's start.
-        gate: of a boat that runs MOOS: where its commander sits, "helm" or "pid", as in FLEET.yaml.
-    """
-
-    name: str
-    platform: str | Platform = "heron"
-    team: int = 0
-    system_id: int = 0
+    name: str  # its name
+    platform: str | Platform = "heron"  # dynamics, a name or a `Platform`
+    team: int = 0  # 0 blue, 1 red
+    system_id: int = 0  # MAVLink system id; 0: position in the list + 1
+    # its link, as the runner opens it: ``udpin:HOST:PORT`` (the boat sends there), ``udpout:HOST:PORT`` (the boat
+    # listens there), ``tcp:HOST:PORT`` (the boat is the server), ``tcpin:HOST:PORT`` (the boat connects); `FREE`:
+    # ``udpout`` with a free port; None: no link
     address: str | None = FREE
+    # scripted policy that steers the boat while nobody commands it by its link; empty: without commands it stays where
+    # it is
     policy: str = ""
-    start: tuple[float, float, float] | None = None
-    gate: str = "helm"
+    start: tuple[float, float, float] | None = None  # x m, y m, heading deg in the field; None: the game's start
+    gate: str = "helm"  # of a boat that runs MOOS: where its commander sits, "helm" or "pid", as in FLEET.yaml
 
 
 @dataclass(frozen=True)
 class AutopilotSettings:
-    """Behaviour of an autopilot; defaults are measured values.
+    """Behaviour of an autopilot; defaults are measured values."""
 
-    Attributes:
-        boot_s: from power on until it arms with all checks. It has a position after 9/42 of this; ATTITUDE is invalid
-            for the first 1/42.
-        timeout_s: commands older than this are dropped.
-        brake_mps2: deceleration of the autopilot's own stops (time-out, LOITER); None: as the platform stops.
-        back_up_m: distance run astern after a time-out stop.
-        top_rate_hz: highest rate of one message.
-        parameters: autopilot parameters that differ from the defaults, by name.
-    """
-
+    # from power on until it arms with all checks. It has a position after 9/42 of this; ATTITUDE is invalid for the
+    # first 1/42
     boot_s: float = 42.0
-    timeout_s: float = 3.0
+    timeout_s: float = 3.0  # commands older than this are dropped
+    # deceleration of the autopilot's own stops (time-out, LOITER); None: as the platform stops
     brake_mps2: float | None = 1.2
-    back_up_m: float = 2.0
-    top_rate_hz: float = 40.0
+    back_up_m: float = 2.0  # distance run astern after a time-out stop
+    top_rate_hz: float = 40.0  # highest rate of one message
+    # autopilot parameters that differ from the defaults, by name
     parameters: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -77,21 +61,14 @@ class AutopilotSettings:
 
 @dataclass(frozen=True)
 class Water:
-    """Wind and current, in true degrees: where the wind comes from, where the current goes to.
+    """Wind and current, in true degrees: where the wind comes from, where the current goes to."""
 
-    Attributes:
-        wind_mps, wind_from_deg: mean wind.
-        gust_share: standard deviation of gusts as a share of the mean wind.
-        leeway_share: drift speed of a boat as a share of the wind speed.
-        current_mps, current_to_deg: the current.
-    """
-
-    wind_mps: float = 0.0
-    wind_from_deg: float = 0.0
-    gust_share: float = 0.3
-    leeway_share: float = 0.03
-    current_mps: float = 0.0
-    current_to_deg: float = 0.0
+    wind_mps: float = 0.0  # mean wind
+    wind_from_deg: float = 0.0  # mean wind
+    gust_share: float = 0.3  # standard deviation of gusts as a share of the mean wind
+    leeway_share: float = 0.03  # drift speed of a boat as a share of the wind speed
+    current_mps: float = 0.0  # the current
+    current_to_deg: float = 0.0  # the current
 
     def __post_init__(self) -> None:
         check_bounds(self, wind_mps=(0.0, 60.0), wind_from_deg=(-360.0, 360.0), gust_share=(0.0, 1.0))
@@ -105,17 +82,11 @@ class Water:
 
 @dataclass(frozen=True)
 class RadioSettings:
-    """Effect of the radio on every packet, in either direction.
+    """Effect of the radio on every packet, in either direction."""
 
-    Attributes:
-        loss: share of packets lost.
-        delay_s: one way.
-        jitter_s: extra delay, drawn per packet between 0 and this; packets may overtake each other.
-    """
-
-    loss: float = 0.0
-    delay_s: float = 0.0
-    jitter_s: float = 0.0
+    loss: float = 0.0  # share of packets lost
+    delay_s: float = 0.0  # one way
+    jitter_s: float = 0.0  # extra delay, drawn per packet between 0 and this; packets may overtake each other
 
     def __post_init__(self) -> None:
         check_bounds(self, loss=(0.0, 1.0), delay_s=(0.0, 60.0), jitter_s=(0.0, 60.0))

@@ -17,10 +17,8 @@ from .hull import STEP_S, Coast, Keep, Order, Steer, Turn
 from .sensing import Snapshot
 from .settings import AutopilotSettings
 
-_ESTIMATE_FLAGS = 831
-"""EKF_STATUS_REPORT: attitude, velocity and position are good."""
-_VERSION = 4 << 24 | 6 << 16
-"""4.6.0, the one that was measured."""
+_ESTIMATE_FLAGS = 831  # EKF_STATUS_REPORT: attitude, velocity and position are good
+_VERSION = 4 << 24 | 6 << 16  # 4.6.0, the one that was measured
 _UNIX_2024_US = 1_704_067_200_000_000
 _CAPABILITIES = (
     mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
@@ -117,8 +115,7 @@ class Mode(IntEnum):
     GUIDED = 15
 
 
-NEEDS_POSITION = frozenset({Mode.LOITER, Mode.GUIDED})
-"""Modes that cannot be entered before the position is known."""
+NEEDS_POSITION = frozenset({Mode.LOITER, Mode.GUIDED})  # modes that cannot be entered before the position is known
 NOT_OFFERED = frozenset({Mode.AUTO, Mode.RTL, Mode.SMART_RTL})
 """Modes that need a mission or a path back, which these boats do not have."""
 
@@ -143,18 +140,13 @@ PARAMETERS: dict[str, tuple[float, int]] = {
 }
 """Defaults and MAV_PARAM_TYPEs."""
 
-WARNING, CRITICAL, INFO = 4, 2, 6
-"""Severities of texts."""
+WARNING, CRITICAL, INFO = 4, 2, 6  # severities of texts
 NO_ARMING = "Arm: AHRS: not using configured AHRS type"
-_POSITION_SHARE, _ATTITUDE_SHARE = 9.0 / 42.0, 1.0 / 42.0
-"""Of the time from power on to arming, as measured."""
+_POSITION_SHARE, _ATTITUDE_SHARE = 9.0 / 42.0, 1.0 / 42.0  # of the time from power on to arming, as measured
 
 
 class Vehicle:
     """One boat's autopilot from power on.
-
-    Args:
-        settings: how it behaves.
 
     Attributes:
         parameters: values by name; kept over a restart, as on a real boat.

@@ -20,17 +20,12 @@ from .moos import LOOPBACK
 FREE_PORT = f"udpout:{LOOPBACK}:0"
 OTHER_END = {"udpin": "udpout", "udpout": "udpin", "tcp": "tcpin", "tcpin": "tcp"}
 """What a boat opens for each kind of address on the runner's side."""
-MOST_PEERS = 8
-"""A listening boat answers at most this many peers, those heard last."""
+MOST_PEERS = 8  # a listening boat answers at most this many peers, those heard last
 REDIAL_S, DIAL_S = 0.5, 0.2
 
 
 def near(address: str, allow_remote: bool) -> str:
-    """Return HOST:PORT of a listener, which must be on this machine without ``allow_remote``.
-
-    Raises:
-        ConfigError: it is elsewhere, or malformed.
-    """
+    """Return HOST:PORT of a listener; `ConfigError` where it is malformed, or elsewhere without ``allow_remote``."""
     host, port = socket_address(address)
     return f"{_near_host(host, address, allow_remote)}:{port}"
 
@@ -111,11 +106,7 @@ class Ports:
         self._reader = mavlink.MAVLink(None)
 
     def plug_in(self, boat: Boat) -> None:
-        """Open a boat's link, if it has one.
-
-        Raises:
-            ConfigError: the address or system id cannot be used.
-        """
+        """Open a boat's link, if it has one; `ConfigError` where its address or system id cannot be used."""
         address, name = boat.spec.address, boat.spec.name
         if address is None:
             return

@@ -23,8 +23,7 @@ from .game import Game
 from .hull import STEP_S, Bear, Keep, Order, Steer, Turn, Weather
 from .sensing import Snapshot
 
-RECENT_S = 5.0
-"""A fault is reported with a separation violation up to this long after it acted, s."""
+RECENT_S = 5.0  # a fault is reported with a separation violation up to this long after it acted, s
 LEFT_S = 2.0
 """A run left its boat in order if the boat is in HOLD within this time after its last obeyed command, s.
 
@@ -34,23 +33,15 @@ failsafe holds it later."""
 
 @dataclass(frozen=True)
 class Mark:
-    """State of one boat at one step.
+    """State of one boat at one step."""
 
-    Attributes:
-        steered: whether a policy, or a commander that it obeys, steers the boat.
-        faults: kinds of the active faults.
-        commanded: whether the boat obeys a commander.
-        held: whether its autopilot is in HOLD, as a run leaves it at its end.
-    """
-
-    steered: bool
-    faults: tuple[str, ...] = ()
-    commanded: bool = False
-    held: bool = False
+    steered: bool  # whether a policy, or a commander that it obeys, steers the boat
+    faults: tuple[str, ...] = ()  # kinds of the active faults
+    commanded: bool = False  # whether the boat obeys a commander
+    held: bool = False  # whether its autopilot is in HOLD, as a run leaves it at its end
 
 
-Marks = Sequence[Sequence[Mark]]
-"""Marks of all boats, step by step."""
+Marks = Sequence[Sequence[Mark]]  # marks of all boats, step by step
 
 
 def last_commanded(marks: Marks) -> list[int]:
@@ -174,11 +165,7 @@ class TruthRecord:
 
 
 def record_of(truth: TruthRecord | None) -> TruthRecord:
-    """Return the record, or raise if there is none.
-
-    Raises:
-        ConfigError: nothing was recorded.
-    """
+    """Return the record; `ConfigError` where nothing was recorded."""
     if truth is None:
         raise ConfigError("nothing was recorded; build SimFleet with record=True, with as many red boats as blue ones")
     return truth
@@ -201,8 +188,7 @@ SENDER = "gps_hub"
 _KEPT = 100
 _ERROR_M, _ERROR_PER_NOISE_M = 0.05, 0.25
 """Error bound of a fix: rounding, plus three standard deviations of the sensors per unit of noise."""
-_PLAY_AFTER_S = 5.0
-"""Scripted players begin when all linked boats of the game have been commanded for this long, s."""
+_PLAY_AFTER_S = 5.0  # scripted players begin when all linked boats of the game have been commanded for this long, s
 
 
 class PositionHub:
@@ -237,16 +223,10 @@ class PositionHub:
 
 
 class World:
-    """Moves all boats.
+    """Moves all boats, of which ``players``, in the game's order, play.
 
-    Args:
-        boats: all boats.
-        weather: wind and current.
-        game: the game that some of them play, or None.
-        players: the boats that play, in the game's order.
-        hub: sends positions, or None.
-        waits: whether scripted players wait until the others are commanded.
-        record_radius_m: distance that counts as a separation violation, m; None: nothing is recorded.
+    If it ``waits``, scripted players wait until the others are commanded. Boats within ``record_radius_m``, m, count as
+    a separation violation; None: nothing is recorded.
     """
 
     def __init__(

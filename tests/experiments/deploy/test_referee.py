@@ -30,39 +30,31 @@ from waiting import repeating, wait_for
 
 NAMES = ("b1", "b2", "r1", "r2")
 PLACES = {"b1": (25.0, 10.0), "b2": (25.0, 30.0), "r1": (55.0, 10.0), "r2": (55.0, 30.0)}
-FLEET = """
+
+
+def text_of(seconds=600.0):
+    """A file of one against one, both with links, on free ports."""
+    blue, red, listen, referee = free_ports(4)
+    link = 'link: {kind: mavlink, address: "udpin:127.0.0.1:%d", system_id: %d}'
+    return f"""
 version: 1
 field: {{origin: {{latitude_deg: 42.0, longitude_deg: -71.0}}, size_m: [80, 40], y_axis_deg: 20.0}}
 geofence: {{xmin_m: -20, ymin_m: -20, xmax_m: 100, ymax_m: 60}}
 team: blue
 rules: {{max_time_s: {seconds}}}
-{feed}
+feed: {{listen: "127.0.0.1:{listen}", referee: "127.0.0.1:{referee}"}}
 boats:
-  - {{name: b1, agent: agent_0, platform: heron, {link}}}
-  - {{name: r1, agent: agent_1, platform: heron, {other}}}
+  - {{name: b1, agent: agent_0, platform: heron, {link % (blue, 1)}}}
+  - {{name: r1, agent: agent_1, platform: heron, {link % (red, 2)}}}
 """
-FEED = 'feed: {{listen: "127.0.0.1:{}", referee: "127.0.0.1:{}"}}'
-UDP = 'link: {{kind: mavlink, address: "udpin:127.0.0.1:{}", system_id: {}}}'
-QUICK = {"autopilot": AutopilotSettings(boot_s=0.0)}
-
-
-def text_of(feed=FEED, seconds=600.0):
-    """A file of one against one, both with links, on free ports."""
-    ports = free_ports(4)
-    links = {"link": UDP.format(ports[0], 1), "other": UDP.format(ports[1], 2)}
-    return FLEET.format(feed=feed.format(*ports[2:]), seconds=seconds, **links)
 
 
 @pytest.fixture
 def fleet_file(tmp_path):
-    """Writes the file of a game of two seconds."""
-
-    def build(feed=FEED):
-        path = tmp_path / "FLEET.yaml"
-        path.write_text(text_of(feed, seconds=2.0))
-        return path
-
-    return build
+    """The file of a game of two seconds."""
+    path = tmp_path / "FLEET.yaml"
+    path.write_text(text_of(2.0))
+    return path
 
 
 @pytest.fixture(autouse=True)
@@ -177,13 +169,12 @@ def hub(fleet, places):
 
 
 def test_the_command_keeps_a_game_and_runners_hear_how_it_stands(fleet_file, tmp_path):
-    path, clock = fleet_file(), MonotonicClock()
-    fleet = load_fleet(path)
+    fleet = load_fleet(fleet_file)
     with (
-        FeedReceiver(fleet.feed.listen, fleet.frame, clock, boats=fleet.names) as runner,
+        FeedReceiver(fleet.feed.listen, fleet.frame, MonotonicClock(), boats=fleet.names) as runner,
         hub(fleet, {"b1": (33.0, 20.0), "r1": (34.0, 20.0)}),
     ):
-        result = CliRunner().invoke(app, ["referee", str(path), "--json", str(tmp_path / "game.json")])
+        result = CliRunner().invoke(app, ["referee", str(fleet_file), "--json", str(tmp_path / "game.json")])
         heard = runner.game()
     assert result.exit_code == 0, result.output
     assert "the game begins" in result.output
@@ -197,7 +188,7 @@ def test_the_command_keeps_a_game_and_runners_hear_how_it_stands(fleet_file, tmp
 
 
 def test_without_addresses_or_players_there_is_no_referee(fleet_file, fleet_of):
-    fleet = load_fleet(fleet_file())
+    fleet = load_fleet(fleet_file)
     with Referee(fleet, ManualClock()), pytest.raises(BridgeError, match="cannot hear the feed"):
         Referee(fleet, ManualClock())
     nobody = fleet_of(1).model_copy(update={"boats": (fleet_of(1).boat("rescue"),)})
@@ -210,8 +201,7 @@ def test_without_addresses_or_players_there_is_no_referee(fleet_file, fleet_of):
 
 
 def test_an_interrupted_referee_says_so(fleet_file):
-    path, asked = fleet_file(), []
-    fleet = load_fleet(path)
+    fleet, asked = load_fleet(fleet_file), []
     with FeedReceiver(fleet.feed.listen, fleet.frame, MonotonicClock(), boats=fleet.names) as runner:
 
         def interrupt():
@@ -220,7 +210,7 @@ def test_an_interrupted_referee_says_so(fleet_file):
                 os.kill(os.getpid(), signal.SIGINT)
 
         with hub(fleet, {"b1": (33.0, 20.0), "r1": (60.0, 20.0)}), repeating(interrupt):
-            result = CliRunner().invoke(app, ["referee", str(path)])
+            result = CliRunner().invoke(app, ["referee", str(fleet_file)])
     assert result.exit_code == 130
     assert "interrupted" in result.stderr
 
@@ -235,7 +225,7 @@ def test_with_signing_boats_and_referee_sign_what_they_say_and_nobody_else_is_he
         FeedReceiver(fleet.feed.listen, fleet.frame, clock, boats=fleet.names, key=bytes.fromhex("12" * 32)) as runner,
         Referee(fleet, clock) as referee,
         FeedSender("gps_hub", [fleet.feed.listen, fleet.feed.referee]) as liar,
-        SimFleet.from_file(fleet, **QUICK) as boats,
+        SimFleet.from_file(fleet, autopilot=AutopilotSettings(boot_s=0.0)) as boats,
     ):
         wait_for(lambda: liar.send_positions([strange]) or len(referee.contacts()) == 2)
         wait_for(lambda: referee.turn() and runner.game() is not None and len(runner.read()) == 2)
