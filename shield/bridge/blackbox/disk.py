@@ -281,8 +281,7 @@ class TlogWriter(AsyncWriter[tuple[str, bytes, int]]):
 
     Args:
         path: of the new file, ``.tlog``.
-        flush_s: longest time between flushes, s.
-        capacity: packets that may wait for the disk; more are dropped and counted.
+        flush_s, capacity: see `AsyncWriter`.
         open_disk: makes the file.
 
     Raises:
@@ -296,13 +295,7 @@ class TlogWriter(AsyncWriter[tuple[str, bytes, int]]):
         super().__init__(path.name, _TlogFile(open_disk(path)), capacity=capacity, flush_s=flush_s)
 
     def on_bytes(self, direction: str, raw: bytes, unix_us: int) -> None:
-        """Take a whole frame as it came or went; never waits, never raises.
-
-        Args:
-            direction: "in" or "out".
-            raw: the frame.
-            unix_us: time, microseconds since 1970.
-        """
+        """Take a whole frame as it came ("in") or went ("out"), at a time in us since 1970; never waits or raises."""
         with contextlib.suppress(BridgeError):  # said once by the writer; the black box makes the loop fall back
             self.put((direction, bytes(raw), unix_us))
 

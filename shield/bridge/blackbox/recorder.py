@@ -169,9 +169,7 @@ class McapWriter(AsyncWriter[Tick | Line]):
     Args:
         path: of the new file, ``.mcap``.
         header: what the shield was built with.
-        flush_s: longest time between flushes to the disk, s.
-        capacity: ticks that may wait for the disk; more are dropped and counted.
-        give_up_s: when the disk has taken nothing for so long, s, `take` raises.
+        flush_s, capacity, give_up_s: see `AsyncWriter`.
         open_disk: makes a file.
         key: 32 bytes of those who may write this log: its chain then carries codes; None: without.
 

@@ -87,13 +87,7 @@ def read_heartbeat(message: Any, received_s: float) -> Heartbeat | None:
 class Autopilot:
     """Takes in what one boat says (a `connection.Receiver`) and asks for what it should say; under one lock.
 
-    Args:
-        boat: its name.
-        endpoint: the wire it answers on.
-        system_id: its autopilot's.
-        frame: of the field.
-        clock: the loop's.
-        rate_hz: of the telemetry asked for, at most 40.
+    Its arguments are those of `vehicle.MavlinkLink`.
 
     Attributes:
         dialogue: questions and answers; ``dialogue.changed`` is the lock of everything here.

@@ -101,12 +101,7 @@ class MavlinkLink(Link):
         self._attached, self._last_rad, self._started_s = False, math.nan, clock.now_s()
 
     def connect(self, timeout_s: float) -> None:
-        """Open the wire, hear the boat's heartbeat, get its streams at the rate asked for.
-
-        Raises:
-            LinkError: the wire cannot be opened, no boat answers in time, it is none of ours to drive, or its streams
-                do not come at the rate asked for.
-        """
+        """Open the wire, hear the boat's heartbeat, get its streams at the rate asked for, all of it in time."""
         patience = Patience(self._clock, timeout_s)
         boat, dialogue = self.autopilot, self.autopilot.dialogue
         self.endpoint.attach(boat.system_id, boat)
@@ -136,9 +131,7 @@ class MavlinkLink(Link):
     def prepare(self, timeout_s: float, is_off: Callable[[], bool] = never) -> None:
         """Read what the autopilot can do and choose the route; GUIDED; arm, all checks on.
 
-        Raises:
-            LinkRefused: the autopilot says no until the time is up; its own words are in the text.
-            LinkError: no answer in time, called off, or somebody took the boat meanwhile; it is left alone as before.
+        `LinkError` also where somebody took the boat meanwhile.
         """
         boat, dialogue, patience = self.autopilot, self.autopilot.dialogue, Patience(self._clock, timeout_s, is_off)
         if boat.heartbeat is None:
@@ -193,11 +186,7 @@ class MavlinkLink(Link):
             )
 
     def send(self, heading_rad: float, speed_mps: float) -> Sent:
-        """Send a command as it is; never waits.
-
-        Raises:
-            LinkError: heading or speed is not finite; nothing is sent.
-        """
+        """Send a command as it is; never waits. `LinkError` where a value is not finite."""
         check_finite(self.boat, heading_rad, speed_mps)
         route = self.autopilot.route
         if route is None:
@@ -219,11 +208,7 @@ class MavlinkLink(Link):
         return self._send(route.name, route.encode(boat.target, self._boot_ms(), heading_rad, 0.0))
 
     def close(self) -> str:
-        """Stop the boat, put it in HOLD, verify both, give the link back; may be called again.
-
-        Returns:
-            What the boat was left doing, in words.
-        """
+        """Stop the boat, put it in HOLD, verify both, give the link back; may be called again."""
         if not self._attached:
             return f"{self.boat}: not connected; nothing was sent"
         try:

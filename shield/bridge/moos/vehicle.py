@@ -89,8 +89,7 @@ class MoosLink(Link):
     def connect(self, timeout_s: float) -> None:
         """Find the MOOSDB, register, and hear where the boat is.
 
-        Raises:
-            LinkError: no MOOSDB there, one of another warp, or nobody posts NAV_* in it.
+        `LinkError` also where the MOOSDB is of another warp, or nobody posts NAV_* in it.
         """
         self.client.start()
         end_s = time.monotonic() + timeout_s
@@ -161,11 +160,7 @@ class MoosLink(Link):
             return nominal
 
     def send(self, heading_rad: float, speed_mps: float) -> Sent:
-        """Post a command as it is; never waits.
-
-        Raises:
-            LinkError: heading or speed is not finite; nothing is posted.
-        """
+        """Post a command as it is; never waits. `LinkError`, and nothing is posted, where a value is not finite."""
         check_finite(self.boat, heading_rad, speed_mps)
         now_s, route = self._clock.now_s(), " and ".join(self.gate.outputs)
         with self._lock:  # also round the post: what is heard meanwhile comes after it
@@ -190,11 +185,7 @@ class MoosLink(Link):
             return Sent(self.boat, self._clock.now_s(), heading, 0.0, f"none: {error}", False)
 
     def close(self) -> str:
-        """Stop the boat, wait until it lies still, end the connection; may be called again.
-
-        Returns:
-            What the boat was left doing, in words.
-        """
+        """Stop the boat, wait until it lies still, end the connection; may be called again."""
         if self._closed:
             return f"{self.boat}: its connection is closed"
         try:

@@ -301,7 +301,7 @@ def told(order, seconds, now_s=0.0, first=1):
 
 
 @pytest.mark.parametrize(
-    "intruder", [{"run": 8, "seq": 0}, {"run": 8, "seq": 2**62}, {"seq": 2**62}, {"seq": 21 + MOST_AHEAD}, {"seq": 0}]
+    "intruder", [{"run": 8, "seq": 0}, {"run": 8, "seq": 2**62}, {"seq": 2**62}, {"seq": 5_000}, {"seq": 0}]
 )
 def test_one_packet_in_a_senders_name_costs_it_none_of_its_own(order, intruder):
     assert told(order, 1.0) == (0, 20)

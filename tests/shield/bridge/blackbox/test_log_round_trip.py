@@ -158,7 +158,7 @@ def odd_tick(number, tick):
 
 def test_every_message_of_a_log_is_valid_and_what_is_not_finite_was_in_it(tmp_path):
     writer = McapWriter(tmp_path / "run.mcap", header_of(), flush_s=0.0, key=bytes(32))
-    for number, tick in enumerate(Encounter(header_of(), 9)):
+    for number, tick in enumerate(Encounter(header_of(), 12)):
         writer.take(dataclasses.replace(odd_tick(number, tick), number=number))
     writer.note("a line")
     writer.close()

@@ -2,6 +2,7 @@
 
 import contextlib
 import math
+import threading
 
 import pytest
 from fake_boat import FakeBoat, wait_for
@@ -176,6 +177,7 @@ def test_a_pilot_who_takes_the_boat_again_while_it_is_taken_back_keeps_it():
 
         def arm_and_take(arm, force):
             boat.armed, boat.mode = True, 4
+            threading.Timer(0.2, setattr, (boat, "mode", 15)).start()  # and gives it back: nobody here may use that
             return mavlink.MAV_RESULT_ACCEPTED
 
         boat._arm = arm_and_take
