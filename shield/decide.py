@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from . import workspace as W
-from .backup.assign import hold
+from .backup.assign import note_manoeuvre
 from .backup.score import ALL, OBSTACLES, OPPONENTS
 from .barriers.boats import reported_margin
 from .barriers.clearance import MARGIN
@@ -25,7 +25,7 @@ from .barriers.registered import unknown_at
 from .barriers.static import STATIC, about
 from .config import ShieldConfig
 from .filter.backup_switch import back_up
-from .filter.blend import any_may_be_blended, blend, verify
+from .filter.blend import any_may_be_blended, blend, rescore_backups
 from .filter.groups import close_groups, make_groups, open_group
 from .filter.last_line import keep_last_line, note_last_resorts
 from .filter.nominal import check_nominal
@@ -76,7 +76,7 @@ def _reported_adversary_horizon(i: int, own: int, scene: Scene) -> float:
     team = scene.boats.team
     if scene.ours[i] or (own >= 0 and team[i] == team[own]):
         return np.nan
-    return 0.0 if scene.known[i] else scene.adversary_horizon_s[i]
+    return 0.0 if scene.predicted[i] else scene.adversary_horizon_s[i]
 
 
 @kernel
@@ -179,7 +179,7 @@ def commit(scene: Scene) -> None:
             memory[W.BACKUP_HEADING] = wrap_degrees(end_deg)
         memory[W.BACKUP_MARGIN] = scene.clear[i, MARGIN]
         memory[W.STATIC_MARGIN] = scene.static_clear[i, MARGIN] if scene.satisfied[i] >= OPPONENTS else 0.0
-        memory[W.JOINT_MARGIN] = scene.joint_m[i] if scene.outnumbered[i] else 0.0
+        memory[W.JOINT_MARGIN] = scene.joint_m[i] if scene.several_pursuers[i] else 0.0
         for j in range(scene.ours.shape[0]):
             apart = scene.boats.table_steps[i] > 0
             memory[W.N_MEMORY + j] = scene.threats_m[i, j] if apart else scene.threat_m[i]
@@ -230,7 +230,7 @@ def groups_left(scene: Scene) -> int:
     _note_causes(scene)
     for i in range(scene.ours.shape[0]):
         if scene.ours[i]:
-            hold(i, scene.held, scene)
+            note_manoeuvre(i, scene.held, scene)
     return make_groups(scene)
 
 
@@ -241,7 +241,7 @@ def begin_group(group: int, scene: Scene) -> int:
     back_up(scene)
     if all_spent(scene) or not any_may_be_blended(scene):
         return 0
-    verify(among_mates(scene), scene)
+    rescore_backups(among_mates(scene), scene)
     return begin_program(scene)
 
 

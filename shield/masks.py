@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from .backup.assign import choose_manoeuvre, hold, settled
+from .backup.assign import choose_manoeuvre, needs_no_search, note_manoeuvre
 from .backup.family import found_turn
 from .backup.rollout import roll_out
 from .backup.score import ALL, OPPONENTS, Score, score_path
@@ -42,7 +42,7 @@ def _begin(b: int, scene: Scene) -> None:
     for i in range(scene.ours.shape[0]):
         copy_row(scene.memory[i], scene.memories[b, i])
         if scene.ours[i]:
-            hold(i, scene.held, scene)
+            note_manoeuvre(i, scene.held, scene)
 
 
 @lean_kernel
@@ -84,12 +84,12 @@ def _has_backup(i: int, scene: Scene) -> bool:
     togo_deg = found_turn(i, scene.next_state[i, L.HEADING], held)
     roll_out(i, trial, held[i, 0], togo_deg, held[i, 2], 1, scene)
     scene.satisfied[i], scene.score_m[i] = score_path(i, trial, SHORT_OF_ALL, scene)
-    if scene.satisfied[i] == ALL or scene.searched[i] > 0 or settled(i, 0, 1, scene):
+    if scene.satisfied[i] == ALL or scene.searched[i] > 0 or needs_no_search(i, 0, 1, scene):
         return scene.satisfied[i] == ALL
     scene.searched[i], scene.spent[0] = 1, 0.0
     choose_manoeuvre(i, scene.command[i, 0], 1, False, scene)
     if scene.satisfied[i] == ALL:
-        hold(i, held, scene)
+        note_manoeuvre(i, held, scene)
     return scene.satisfied[i] == ALL
 
 

@@ -194,12 +194,12 @@ class Scene(NamedTuple):
     radius: Annotated[Array, "n", "n"]  # required distance, m
     course: Annotated[Array, "n", 4]  # position one step ahead at present velocity, and heading as a unit vector
     pursued: Annotated[BoolArray, "n"]  # whether an opponent near the boat may pursue it
-    outnumbered: Annotated[BoolArray, "n"]  # whether several can come near to it, see `barriers.value_function`
+    several_pursuers: Annotated[BoolArray, "n"]  # whether several can come near to it, see `barriers.value_function`
     reach_samples: Annotated[IntArray, "n"]  # path samples over which opponents may be followed
     driven: Annotated[Array, "n", 4]
-    known: Annotated[BoolArray, "n"]  # boats whose way is predicted by what drives them, in ``path``
+    predicted: Annotated[BoolArray, "n"]  # boats whose way is predicted by what drives them, in ``path``
     adversary_horizon_s: Annotated[Array, "n"]  # time from now for which each opponent is adversarial
-    # required margins, m: those of the nominal check, zero while backups are assigned, then those of `blend.verify`
+    # required margins, m: of the nominal check, 0 while backups are assigned, then of `blend.rescore_backups`
     target: Annotated[Array, "n"]  # from boats that are not own
     teammate_target_m: Annotated[Array, "n"]  # from own boats
     threat_target_m: Annotated[Array, "n", "n"]  # from each pursuing opponent
@@ -217,7 +217,7 @@ class Scene(NamedTuple):
     bound: Annotated[IntArray, "n+1"]  # active constraint: a boat, -1 none, -2 and below static ones
     satisfied: Annotated[IntArray, "n"]  # level that it satisfies, see `backup.score`,
     score_m: Annotated[Array, "n"]  # and the other entry of its score
-    violates_known: Annotated[BoolArray, "n+1"]  # whether a required margin from boats whose way is known is violated
+    violates_predicted: Annotated[BoolArray, "n+1"]  # whether the margin from one whose way is known falls short
     violates_pursuers: Annotated[BoolArray, "n+1"]  # the same against pursuers
     threat_m: Annotated[Array, "n+1"]  # least margin against pursuers
     threat_by: Annotated[IntArray, "n+1"]  # the opponent it is from, -1: none
@@ -230,7 +230,7 @@ class Scene(NamedTuple):
     # scratch
     row: Annotated[Array, L.N_STATE]
     out: Annotated[Array, 4]
-    spare2: Annotated[Array, 4]
+    scratch_clear: Annotated[Array, 4]
     ways: Annotated[Array, "n", 3, 5]  # places at which an opponent may be when tables are looked up
     lookup: Annotated[Array, "n", "n", 5]  # place of each boat at the last lookup of each opponent, and margin
     runs: Annotated[Array, 2, N_RUN]  # rollouts of a pursuer: straight for the boat, and leading it

@@ -84,7 +84,7 @@ def refresh(i: int, scene: Scene) -> None:
 
 
 @lean_kernel
-def settled(i: int, sweep: int, done: int, scene: Scene) -> bool:
+def needs_no_search(i: int, sweep: int, done: int, scene: Scene) -> bool:
     """Return whether the search for boat i is over in this sweep, see `assign_manoeuvres`."""
     memory = scene.memory
     was_short = (
@@ -98,7 +98,7 @@ def settled(i: int, sweep: int, done: int, scene: Scene) -> bool:
 
 
 @lean_kernel
-def hold(i: int, held: Array, scene: Scene) -> None:
+def note_manoeuvre(i: int, held: Array, scene: Scene) -> None:
     """Note boat i's manoeuvre as seen from its predicted state: side, end heading (NaN: no turn), speed."""
     side, togo = scene.manoeuvre[i, 0], scene.manoeuvre[i, 1]
     held[i, 0], held[i, 2] = side, scene.manoeuvre[i, 2]
@@ -114,7 +114,7 @@ def _continue_manoeuvre(i: int, scene: Scene) -> None:
 
 
 @lean_kernel
-def rate(scene: Scene) -> None:
+def score_all(scene: Scene) -> None:
     """Score the manoeuvres of all own boats again."""
     for i in range(scene.ours.shape[0]):
         if scene.ours[i]:
@@ -127,7 +127,7 @@ def recheck(scene: Scene) -> None:
     for i in range(scene.ours.shape[0]):
         if scene.moving[i]:
             _continue_manoeuvre(i, scene)
-    rate(scene)
+    score_all(scene)
 
 
 @lean_kernel
@@ -171,7 +171,7 @@ def assign_manoeuvres(scene: Scene, done: int, who: BoolArray) -> bool:
             best_of = done == 0 and sweep == 0
             if not best_of:
                 refresh(i, scene)
-                if settled(i, sweep, done, scene) or all_spent(scene):
+                if needs_no_search(i, sweep, done, scene) or all_spent(scene):
                     continue
             if scene.searched[i] == changes and not (done == 0 and sweep == 1):  # it would find the same again
                 continue

@@ -21,7 +21,7 @@ def pursuit_extent(i: int, slot: int, scene: Scene) -> int:
     boats = scene.boats
     if not scene.pursued[i] or boats.table_steps[i] == 0:
         return PURSUERS if scene.pursued[i] else NO_PURSUERS
-    how = PURSUERS_TILL_READY if scene.outnumbered[i] else NO_PURSUERS
+    how = PURSUERS_TILL_READY if scene.several_pursuers[i] else NO_PURSUERS
     for j in range(scene.near.shape[0]):
         if j == i or not scene.near[i, j] or boats.team[i] == boats.team[j] or not may_pursue(j, scene):
             continue
@@ -71,7 +71,7 @@ def lay_placed(i: int, slot: int, done: int, scene: Scene) -> None:
     if how != NO_PURSUERS:
         samples = max(samples, chased + boats.thrust_samples[i])
     earliest = 0 if done == 1 else (boats.table_steps[i] + boats.stride - 1) // boats.stride
-    if scene.outnumbered[i]:
+    if scene.several_pursuers[i]:
         earliest = max(earliest, boats.joint_samples)
     if done == 1:
         _roll_out_command(i, slot, scene)

@@ -114,16 +114,16 @@ def score_path(i: int, slot: int, best: Score, scene: Scene) -> Score:
     if not clear[MARGIN] >= 0.0:
         _skip_pursuers(slot, scene)
         return Score(NOTHING, clear[MARGIN])
-    touched = clear_of_near_obstacles(i, slot, scene, 0.0, scene.spare2)
-    if not scene.spare2[MARGIN] >= 0.0:
-        score = Score(BOATS, scene.spare2[MARGIN] + LATER_SCORE_M * scene.spare2[SAMPLE])
+    touched = clear_of_near_obstacles(i, slot, scene, 0.0, scene.scratch_clear)
+    if not scene.scratch_clear[MARGIN] >= 0.0:
+        score = Score(BOATS, scene.scratch_clear[MARGIN] + LATER_SCORE_M * scene.scratch_clear[SAMPLE])
         if better(score, best):
             worst_pursuer(i, slot, -FAR, -FAR, scene)
         else:
             _skip_pursuers(slot, scene)
         scene.refused_by_table[slot], scene.bound[slot] = False, touched
         return score
-    sure_m, short = clear[MARGIN], scene.violates_known[slot]
+    sure_m, short = clear[MARGIN], scene.violates_predicted[slot]
     if short and not better(Score(OBSTACLES, sure_m), best):
         _skip_pursuers(slot, scene)
         return Score(OBSTACLES, sure_m)

@@ -48,7 +48,7 @@ def clear_of_boat(i: int, j: int, path: Array, scene: Scene, floor_m: float, cap
     search = closing(i, j, scene), scene.radius[i, j], floor_m, cap_m
     tail, samples = tuning.straight_horizon_s / boats.sample_s, boats.samples[i]
     course, way = scene.course[j], state[j, L.SPEED] * boats.sample_s
-    if ours[j] or scene.known[j]:
+    if ours[j] or scene.predicted[j]:
         samples = max(samples, boats.samples[j])
         clear_of_course(path, scene.path[j], course, way, samples, tail, search, scene.out)
     else:
@@ -66,14 +66,14 @@ def required_margin_m(i: int, j: int, scene: Scene) -> float:
 def worst_clearance(i: int, slot: int, scene: Scene, floor_m: float) -> None:
     """Find the worst clearance of boat i on the path in ``slot`` from teammates' paths and opponents' straight courses.
 
-    ``scene.violates_known[slot]`` says whether one of them is below its required margin. Then the constraint that is
-    violated by most is active; of margins below 0 the least.
+    ``scene.violates_predicted[slot]`` says whether one of them is below its required margin. Then the constraint that
+    is violated by most is active; of margins below 0 the least.
     """
     state, tuning = scene.state, scene.tuning
     clear = scene.clear[slot]
     clear[MARGIN] = FAR
     scene.bound[slot] = -1
-    scene.violates_known[slot] = False
+    scene.violates_predicted[slot] = False
     shortest_m = 0.0
     for j in range(state.shape[0]):
         if j == i or not scene.near[i, j]:
@@ -83,12 +83,12 @@ def worst_clearance(i: int, slot: int, scene: Scene, floor_m: float) -> None:
         clear_of_boat(i, j, scene.path[slot], scene, floor_m, enough_m)
         lacks_m = scene.out[MARGIN] - least_m
         if lacks_m < shortest_m:
-            scene.violates_known[slot], shortest_m = True, lacks_m
+            scene.violates_predicted[slot], shortest_m = True, lacks_m
             if clear[MARGIN] >= 0.0:
                 scene.bound[slot] = j
         if scene.out[MARGIN] < clear[MARGIN]:
             copy_row(clear, scene.out)
-            if not scene.violates_known[slot] or clear[MARGIN] < 0.0:
+            if not scene.violates_predicted[slot] or clear[MARGIN] < 0.0:
                 scene.bound[slot] = j
             if clear[MARGIN] < floor_m:
                 return

@@ -12,7 +12,7 @@ from ..platforms import layout as L
 from ..platforms.step import step_boat
 from ..platforms.usv import next_thrust, wrap_degrees
 from ..workspace import DRIVEN, PATH_COST, PURSUER_COST, Scene
-from .value_function import find_outnumbered, run_opponents
+from .value_function import find_several_pursuers, run_opponents
 
 REGAIN_M = 0.01
 """A pair inside the buffer must part by at least this in the next step, m."""
@@ -38,7 +38,7 @@ def find_neighbours(scene: Scene) -> None:
         for j in range(i):
             _note_pair(i, j, scene)
     predict_game_controlled(scene)
-    find_outnumbered(scene)
+    find_several_pursuers(scene)
 
 
 @lean_kernel
@@ -132,14 +132,14 @@ def note_predicted(given: Array, scene: Scene) -> None:
         x_m, y_m = driven[DRIVEN_X], driven[DRIVEN_Y]
         place = (math.isnan(x_m) and math.isnan(y_m)) or (abs(x_m) <= LARGEST and abs(y_m) <= LARGEST)
         lasts = driven[DRIVEN_S] >= last * boats.sample_s
-        scene.known[i] = not ours[i] and place and lasts and 0.0 <= driven[DRIVEN_MPS] <= LARGEST_SPEED_MPS
+        scene.predicted[i] = not ours[i] and place and lasts and 0.0 <= driven[DRIVEN_MPS] <= LARGEST_SPEED_MPS
 
 
 @lean_kernel
 def may_pursue(j: int, scene: Scene) -> bool:
     """Return whether opponent j may do more than hold its course or follow its predicted way."""
     boats = scene.boats
-    return boats.granted_turn_dps[j] > 0.0 and not scene.known[j]
+    return boats.granted_turn_dps[j] > 0.0 and not scene.predicted[j]
 
 
 @lean_kernel
@@ -153,7 +153,7 @@ def _near_ours(j: int, scene: Scene) -> bool:
 
 @lean_kernel
 def predict_game_controlled(scene: Scene) -> None:
-    """Predict boats of ``scene.known`` into ``scene.path``; sample 0 is one step of the model ahead.
+    """Predict boats of ``scene.predicted`` into ``scene.path``; sample 0 is one step of the model ahead.
 
     Only boats near own ones are predicted, as long as the longest backup manoeuvre.
     """
@@ -162,7 +162,7 @@ def predict_game_controlled(scene: Scene) -> None:
     for i in range(state.shape[0]):
         last = max(last, boats.samples[i])
     for j in range(state.shape[0]):
-        if not scene.known[j] or not _near_ours(j, scene):
+        if not scene.predicted[j] or not _near_ours(j, scene):
             continue
         drive, path, row = scene.driven[j], scene.path[j], scene.row
         copy_row(row, state[j])

@@ -271,7 +271,8 @@ def clear_of_pursuer(i: int, j: int, slot: int, floor_m: float, scene: Scene) ->
     It is the worst of several pursuers: steering at the boat or for the meeting point, turning hard or gently. The
     rudder that last came below its floor is checked first. Pursuers are followed until the boat's thrust is full, and
     then for as long as such a boat needs to get away. If the pair has a table, the table covers what follows once
-    thrust is full; for an outnumbered boat (see `value_function.find_outnumbered`) not before ``boats.joint_samples``.
+    thrust is full; for a boat with several pursuers (see `value_function.find_several_pursuers`) not before
+    ``boats.joint_samples``.
     """
     boats, ready = scene.boats, int(scene.ready[slot, READY_SAMPLE])
     to_table = ready >= 0 and tabled(i, j, scene)
@@ -314,8 +315,8 @@ def _note(margin_m: float, j: int, slot: int, scene: Scene) -> None:
 def _clear_of_threat(i: int, j: int, slot: int, level_m: float, least_m: float, scene: Scene) -> bool:
     """Note the worst that opponent j may do; return False if it is below its floor, given by target, level and least.
 
-    For an outnumbered boat, j is also rolled out for a while and looked up from there. On a manoeuvre on which thrust
-    never becomes full, such a boat counts as lost.
+    For a boat with several pursuers, j is also rolled out for a while and looked up from there. On a manoeuvre on which
+    thrust never becomes full, such a boat counts as lost.
     """
     target_m = scene.threat_target_m[i, j]
     floor_m, by_table = max(least_m, min(target_m, level_m)), table_answers(i, j, slot, scene)
@@ -327,7 +328,7 @@ def _clear_of_threat(i: int, j: int, slot: int, level_m: float, least_m: float, 
         margin_m = clear_of_pursuer(i, j, slot, floor_m, scene)
     scene.threats_m[slot, j] = margin_m
     _note(margin_m, j, slot, scene)
-    if not margin_m >= floor_m or not by_table or not scene.outnumbered[i]:
+    if not margin_m >= floor_m or not by_table or not scene.several_pursuers[i]:
         return margin_m >= floor_m
     floor_m, margin_m = max(least_m, min(scene.joint_target_m[i], level_m)), -scene.radius[i, j]
     if scene.ready[slot, READY_SAMPLE] >= 0.0:
@@ -340,7 +341,7 @@ def _clear_of_threat(i: int, j: int, slot: int, level_m: float, least_m: float, 
 @lean_kernel
 def _falls_short(i: int, slot: int, scene: Scene) -> bool:
     """Return whether a margin against pursuers on the path in ``slot`` is below the required one."""
-    short = scene.outnumbered[i] and not scene.joint_m[slot] >= scene.joint_target_m[i]
+    short = scene.several_pursuers[i] and not scene.joint_m[slot] >= scene.joint_target_m[i]
     for j in range(scene.ours.shape[0]):
         short = short or not scene.threats_m[slot, j] >= scene.threat_target_m[i, j]
     return short

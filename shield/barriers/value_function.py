@@ -55,7 +55,7 @@ def run_opponents(steps: int, scene: Scene) -> None:
     scene.pursuers_known[:] = False
     scene.lookup[:, :, PLACE_X] = np.nan
     for j in range(state.shape[0]):
-        if ours[j] or scene.known[j] or not boats.has_table[j]:
+        if ours[j] or scene.predicted[j] or not boats.has_table[j]:
             continue
         params = boats.params[j]
         full = turn_of_rudder(params, params[L.MAX_THRUST], min(params[L.MAX_RUDDER], 100.0), tuning.model_s)
@@ -69,7 +69,7 @@ def run_opponents(steps: int, scene: Scene) -> None:
 
 
 @lean_kernel
-def find_outnumbered(scene: Scene) -> None:
+def find_several_pursuers(scene: Scene) -> None:
     """Mark own boats near more than one opponent of which the tables report something, at whatever thrust.
 
     Each table knows one opponent only: two may each leave a way out, and not the same one. Opponents of such a boat
@@ -78,7 +78,7 @@ def find_outnumbered(scene: Scene) -> None:
     state, ours, boats = scene.state, scene.ours, scene.boats
     n = state.shape[0]
     for i in range(n):
-        scene.outnumbered[i] = False
+        scene.several_pursuers[i] = False
         if not ours[i] or boats.table_steps[i] == 0:
             continue
         _note_place(state[i], boats.ready_thrust[i], scene.look[i])
@@ -90,7 +90,7 @@ def find_outnumbered(scene: Scene) -> None:
             if table_margin(i, j, scene.look[i], scene.ways[j], table_m, scene) < FAR:
                 count += 1
                 if count > 1:
-                    scene.outnumbered[i] = True
+                    scene.several_pursuers[i] = True
                     break
 
 
@@ -115,7 +115,7 @@ def tabled(i: int, j: int, scene: Scene) -> bool:
     """Return whether a table is for boat i and opponent j and covers enough of them."""
     boats = scene.boats
     table = boats.table[i, j]
-    if table < 0 or scene.inside_separation[i, j] or scene.known[j]:
+    if table < 0 or scene.inside_separation[i, j] or scene.predicted[j]:
         return False
     return scene.radius[i, j] + boats.table_margin_m + ROOM_M <= boats.tables.axes[table, CAP]
 

@@ -30,7 +30,7 @@ from ..jit import lean_kernel
 from ..platforms import layout as L
 from ..platforms.actuator import command_for_turn, full_turn
 from ..workspace import BACKUP, BEST_EFFORT, STOPPED, Scene
-from .nominal import check
+from .nominal import predict_and_score
 
 
 @lean_kernel
@@ -66,8 +66,8 @@ def slack_of(i: int, scene: Scene) -> float:
     if scene.satisfied[i] >= OPPONENTS:
         least = min(least, scene.static_clear[i, MARGIN])
     if scene.satisfied[i] == BOATS:  # of an obstacle near in time nothing else is noted
-        clear_of_near_obstacles(i, i, scene, 0.0, scene.spare2)
-        least = min(least, scene.spare2[MARGIN])
+        clear_of_near_obstacles(i, i, scene, 0.0, scene.scratch_clear)
+        least = min(least, scene.scratch_clear[MARGIN])
     return max(0.0, -least)
 
 
@@ -184,7 +184,7 @@ def _find_backups(count: int, scene: Scene) -> None:
     for m in range(count):
         if scene.reason[scene.movers[m]] != STOPPED:
             command_backup(scene.movers[m], scene)
-    check(scene)
+    predict_and_score(scene)
 
 
 @lean_kernel

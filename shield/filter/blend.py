@@ -7,14 +7,14 @@ have to give way for longer.
 
 from __future__ import annotations
 
-from ..backup.assign import rate
+from ..backup.assign import score_all
 from ..backup.score import ALL, SAME_M
 from ..jit import copy_row, lean_kernel
 from ..platforms import layout as L
 from ..platforms.actuator import command_for_turn
 from ..platforms.usv import wrap_degrees
 from ..workspace import BACKUP, BY_LINE_SEARCH, Scene, all_spent
-from .nominal import check, set_required_margins
+from .nominal import predict_and_score, set_required_margins
 
 TURN, SPEED, HEADING, SATISFIED, SCORE = range(5)
 """Columns of ``scene.verified``."""
@@ -35,7 +35,7 @@ def note_verified(scene: Scene) -> None:
 
 
 @lean_kernel
-def verify(static_rate: bool, scene: Scene) -> None:
+def rescore_backups(static_rate: bool, scene: Scene) -> None:
     """Score the commands just checked against the required margins of the nominal check, and note the result.
 
     Without ``static_rate``, static constraints require only their distance, not their class-K rate.
@@ -43,7 +43,7 @@ def verify(static_rate: bool, scene: Scene) -> None:
     set_required_margins(scene)
     if not static_rate:
         scene.static_target_m[:] = 0.0
-    rate(scene)
+    score_all(scene)
     note_verified(scene)
 
 
@@ -67,7 +67,7 @@ def restore_verified(i: int, scene: Scene) -> None:
 
 
 @lean_kernel
-def costs_at_most(most_m: float, scene: Scene) -> bool:
+def keeps_backup_scores(most_m: float, scene: Scene) -> bool:
     """Return whether no boat scores below its verified backup, by more than ``most_m`` where all is satisfied."""
     ours, verified = scene.ours, scene.verified
     within = True
@@ -122,8 +122,8 @@ def _blend_one(i: int, scene: Scene) -> None:
     for _ in range(TRIALS):
         at = 0.5 * (kept + too_far)
         _give_back(at, i, scene)
-        check(scene)
-        if costs_at_most(0.0, scene):
+        predict_and_score(scene)
+        if keeps_backup_scores(0.0, scene):
             kept = at
         else:
             too_far = at
@@ -135,7 +135,7 @@ def _blend_one(i: int, scene: Scene) -> None:
     elif at != kept:
         _give_back(kept, i, scene)
     if at != kept:
-        check(scene)
+        predict_and_score(scene)
 
 
 @lean_kernel

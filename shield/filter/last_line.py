@@ -10,7 +10,7 @@ is made again with that stop in it.
 
 from __future__ import annotations
 
-from ..backup.assign import rate, refresh
+from ..backup.assign import refresh, score_all
 from ..backup.family import IN_MEMORY, candidate, remembered
 from ..backup.paths import sail
 from ..backup.rollout import roll_out
@@ -162,7 +162,7 @@ def keep_last_line(scene: Scene) -> None:
             going_on = True
     if not going_on:
         return
-    rate(scene)
+    score_all(scene)
     for i in range(scene.ours.shape[0]):
         if scene.ours[i] and scene.satisfied[i] < OPPONENTS and scene.reason[i] not in (STOPPED, HELD):
             scene.reason[i], scene.slack_m[i] = BEST_EFFORT, slack_of(i, scene)

@@ -30,7 +30,7 @@ def predict(i: int, commands: Array, scene: Scene) -> None:
 
 
 @lean_kernel
-def check(scene: Scene) -> None:
+def predict_and_score(scene: Scene) -> None:
     """Predict the movers, and score every boat on the manoeuvre in ``scene.held``."""
     for i in range(scene.ours.shape[0]):
         if scene.moving[i]:

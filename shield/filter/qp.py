@@ -32,8 +32,8 @@ from ..platforms.actuator import command_for_turn, full_turn
 from ..platforms.step import step_boat
 from ..workspace import BY_QP, LEAST_CHANGE, ROW_COST, STOPPED, Scene, all_spent
 from .backup_switch import list_movers
-from .blend import LITTLE_M, SCORE, before_opponent, costs_at_most, note_verified, restore_verified, satisfies_all
-from .nominal import check
+from .blend import LITTLE_M, SCORE, before_opponent, keeps_backup_scores, note_verified, restore_verified, satisfies_all
+from .nominal import predict_and_score
 
 STATIC_AIM_M = 1e-3
 """Rows of static constraints aim this much beyond the target, so that the exact check does not fail by rounding."""
@@ -281,7 +281,7 @@ def begin_program(scene: Scene) -> int:
     for m in range(count):
         copy_row(scene.command[scene.movers[m]], scene.checked[scene.movers[m]])
     if count > 0:
-        check(scene)
+        predict_and_score(scene)
     return count
 
 
@@ -310,8 +310,8 @@ def accept(scene: Scene, z: Array, count: int) -> bool:
     """Take an answer of the QP; return whether it costs no boat more than a little by the exact check."""
     if not _take_answer(z, count, scene):
         return False
-    check(scene)
-    return costs_at_most(LITTLE_M, scene)
+    predict_and_score(scene)
+    return keeps_backup_scores(LITTLE_M, scene)
 
 
 @lean_kernel
@@ -326,4 +326,4 @@ def end_program(scene: Scene, safe: bool, count: int) -> None:
     if safe:
         note_verified(scene)
     elif count > 0:
-        check(scene)
+        predict_and_score(scene)

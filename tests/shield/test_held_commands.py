@@ -78,7 +78,7 @@ def test_the_place_foreseen_is_where_the_game_puts_the_boat(steps, platform):
     while env.agents:
         actions = blue.act(observations, infos)
         work, ours = blue.shield._deciders.scene, blue.decisions.fleet.controlled
-        foreseen, known, path = work.next_state.copy(), work.known.copy(), work.path.copy()
+        foreseen, known, path = work.next_state.copy(), work.predicted.copy(), work.path.copy()
         changed += int(blue.decisions.intervened.any())
         places.clear()
         observations, *_, infos = env.step({**actions, **red.act(observations, infos)})
@@ -108,7 +108,7 @@ def test_a_disabled_boat_is_foreseen_to_coast_and_no_shield_decides_for_it():
     speed, x, y, time_s = wrapped.decisions.fleet.driven[1]
     assert (speed, np.isnan(x), np.isnan(y)) == (0.0, True, True)
     assert time_s == pytest.approx(40.0)
-    assert wrapped.shield._deciders.scene.known.tolist() == [False, True, False, False, False, False]
+    assert wrapped.shield._deciders.scene.predicted.tolist() == [False, True, False, False, False, False]
 
 
 def test_a_boat_that_is_nearly_free_is_feared_as_any_other():
@@ -121,7 +121,7 @@ def test_a_boat_that_is_nearly_free_is_feared_as_any_other():
     shield = Shield.for_game(env)
     reader = reader_of(env)
     shield.decide(reader.fleet(0, False), __import__("steerclear").shield.Commands.game_deg(np.zeros((6, 2))))
-    assert shield._deciders.scene.known.tolist() == [False, False, False, True, False, False]
+    assert shield._deciders.scene.predicted.tolist() == [False, False, False, True, False, False]
 
 
 def test_shields_for_moves_and_for_decisions_are_told_apart():
