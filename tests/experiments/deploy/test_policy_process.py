@@ -163,8 +163,9 @@ if os.fork() == 0:
 """
 
 
-def test_what_it_started_and_wrote_ends_with_it(run, ask, write_entry, tmp_path, monkeypatch):
-    """Also what left its session."""
+@pytest.mark.parametrize("watched", [True, False])
+def test_what_it_started_and_wrote_ends_with_it(run, ask, write_entry, tmp_path, monkeypatch, watched):
+    """Also what left its session, and where the process that watches it was killed."""
     notes, temporary = tmp_path / "notes", tmp_path / "temporary"
     for folder in (notes, temporary):
         folder.mkdir()
@@ -176,10 +177,11 @@ def test_what_it_started_and_wrote_ends_with_it(run, ask, write_entry, tmp_path,
     wait_until(lambda: len([note for note in notes.iterdir() if note.read_text()]) == 2)
     pids = [int(note.read_text()) for note in notes.iterdir()]
     assert all(map(is_running, pids))
+    if not watched:
+        os.kill(process._worker._process.pid, signal.SIGKILL)
     process.close()
     process.close()
-    wait_until(lambda: not any(map(is_running, pids)))
-    assert list(temporary.iterdir()) == []
+    wait_until(lambda: not any(map(is_running, pids)) and not list(temporary.iterdir()))
 
 
 def test_it_ends_when_the_runner_is_killed(fleet_of, write_entry, tmp_path):

@@ -49,7 +49,7 @@ def degrees_of(x_m, y_m):
 def as_tlog(path, rows, systems=(1,), every=1, top=lambda time_s: 3.0, before_fix=0, component=None):
     """A telemetry log: commands each row, positions every so many, WP_SPEED where it changes.
 
-    First some positions without a fix; positions of another component are elsewhere.
+    First some positions without a fix; another component is elsewhere, and another boat is told to stop.
     """
     boat, ground = mavlink.MAVLink(None, 1, 1), mavlink.MAVLink(None, 255, 190)
     told = None
@@ -73,6 +73,7 @@ def as_tlog(path, rows, systems=(1,), every=1, top=lambda time_s: 3.0, before_fi
                     put(boat, place, row[0])
                     if component is not None:
                         put(mavlink.MAVLink(None, 1, component), place_message(100, 100), row[0])
+                        put(ground, messages_of((*row[:5], 0.0, 0.0), 9, 3.0)[2], row[0])
 
 
 def place_message(latitude, longitude, *more):

@@ -106,12 +106,13 @@ def test_positions_before_a_fix_are_left_out(tmp_path):
     assert ways[1] == pytest.approx(ways[0], rel=1e-3)
 
 
-def test_another_component_of_the_boat_does_not_move_it(tmp_path):
+def test_another_component_and_commands_to_another_boat_do_not_move_it(tmp_path):
     rows = long_drive()
     plain, _ = read(tmp_path / "a.tlog", rows, as_tlog)
     mixed, said = read(tmp_path / "b.tlog", rows, as_tlog, component=191)
     assert not said
     assert np.allclose(plain[0].seen, mixed[0].seen)
+    assert np.allclose(plain[0].told, mixed[0].told)
 
 
 @pytest.mark.parametrize("receivers", [(True, False), (False, True)])
@@ -216,6 +217,7 @@ def test_what_contradicts_the_rest_is_cut_out_and_told(case, words, tmp_path):
     for run in runs:
         assert np.hypot(*np.diff(run.seen[:, :2], axis=0).T).max() < 0.5
         assert run.seen[:, 3].max() < 2.5
+    assert case != "clock set back" or sum(run.seconds for run in runs) > 190.0, "no time was told twice"
 
 
 @pytest.mark.parametrize("case", ["headings in radians", "x is north", "headings are 90 off"])
