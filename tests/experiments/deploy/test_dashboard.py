@@ -189,7 +189,8 @@ def test_what_was_wanted_and_sent_is_shown_whole(stream, columns, rows):
     )
     rows_of = zip(tick.sent.items(), sent.values.tolist(), strict=False)
     told = {name: dataclasses.replace(one, speed_mps=row[0], heading_rad=row[1]) for (name, one), row in rows_of}
-    decisions = dataclasses.replace(tick.decisions, nominal=wanted, filtered=sent)
+    changed = np.array([False, True, False, False])
+    decisions = dataclasses.replace(tick.decisions, nominal=wanted, filtered=sent, intervened=changed)
     lines = shown(stream.fleet, Moment(dataclasses.replace(tick, decisions=decisions, sent=told), 5.0), columns, rows)
     cells = [[cell_of(lines, f"blue_{k}", title) for k in (1, 2)] for title in ("nominal", "filtered")]
     assert cells == [["1.5 054°", "12.5 359°"], ["1.5 054°", "10.2 008°"]]

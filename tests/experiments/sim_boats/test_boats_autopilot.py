@@ -44,6 +44,7 @@ def test_boots_as_measured():
         (MODE, (1, 77), mavlink.MAV_RESULT_FAILED),
         (MODE, (1, 10), mavlink.MAV_RESULT_FAILED),
         (MODE, (1, 4), mavlink.MAV_RESULT_ACCEPTED),
+        (MODE, (1, 0), mavlink.MAV_RESULT_ACCEPTED),  # it is in it already
         (ARM, (3,), mavlink.MAV_RESULT_UNSUPPORTED),
         (ARM, (math.nan,), mavlink.MAV_RESULT_UNSUPPORTED),
         (INTERVAL, (9999, 1e5), mavlink.MAV_RESULT_FAILED),
