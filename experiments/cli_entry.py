@@ -68,11 +68,12 @@ def check(
 
 def check_lines(found: dict[str, Any]) -> list[str]:
     """What a check found, in sentences."""
-    imports, game = found["imports"], found["game"]
+    imports, game, made = found["imports"], found["game"], found["made_for"]
     missing = f"; not installed here: {', '.join(imports['missing'])}" if imports["missing"] else ""
+    missing += "; of these numba is only used where it is there" if made is not None else ""
     lines = [
         f"{headline(found)}.",
-        f"imports beyond Python's own: {', '.join(imports['needed']) or 'nothing'}{missing}{_stands_in(found)}",
+        f"imports beyond Python's own: {', '.join(imports['needed']) or 'nothing'}{missing}",
         f"time of a decision of the team: mean {time_text(found['mean_decision_ms'])}, longest "
         f"{time_text(found['max_decision_ms'])} in {found['decisions']} decisions ({found['calls']} actions); "
         f"{found['late_decisions']} took longer than the game gives ({found['decision_ms']:g} ms)",
@@ -80,18 +81,13 @@ def check_lines(found: dict[str, Any]) -> list[str]:
         f"against {game['duration_s']:g} s of boats that hold: {game['captures']} captures, {game['grabs']} grabs, "
         f"{game['tags']} tags, {game['collisions']} collisions counted by the game",
     ]
-    if (made := found["made_for"]) is not None:
+    if made is not None:
         lines.insert(1, f"made by steerclear for preset {made['preset']}; {_kept(made['shield'])}")
     lines += [f"could not be read as Python: {name}" for name in imports["unread"]]
     for one in found["failures"]:
         boats = ", ".join(f"{boat} x {count}" for boat, count in one["boats"].items())
         lines.append(f"failed: {one['kind']} ({boats}): {one['message']}")
     return lines
-
-
-def _stands_in(found: dict[str, Any]) -> str:
-    """What a zip that steerclear made does without."""
-    return "; of these numba is only used where it is there" if found["made_for"] is not None else ""
 
 
 def _kept(shield: dict[str, Any] | None) -> str:

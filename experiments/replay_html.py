@@ -113,13 +113,14 @@ def pack(record: Record, title: str) -> dict[str, Any]:
     packer.add_codes("reason", record["reason"].T.astype(np.uint8), None)
     packer.add_codes("intervened", record["intervened"].T.astype(np.uint8), None)
     content = b"".join(packer.content)
+    changed = np.flatnonzero(np.any(np.diff(record["captures"], axis=0) != 0, axis=1)) + 1
     return {
         "title": title,
         "meta": page_meta(record),
         "steps": len(record["wanted"]),
         "columns": packer.columns,
         "breaches": np.round(record["breaches"], 3).tolist(),
-        "captures": score_changes(record["captures"]),
+        "captures": [[int(step), *map(int, record["captures"][step])] for step in (0, *changed)],
         "data": base64.b64encode(zlib.compress(content, 9)).decode(),
     }
 
@@ -128,12 +129,6 @@ def span(values: NDArray[Any]) -> tuple[float, float]:
     """Return the smallest and largest finite value; zeros where there is none."""
     finite = values[np.isfinite(values)]
     return (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
-
-
-def score_changes(captures: NDArray[Any]) -> list[list[int]]:
-    """Return [step, blue, red] for the start and for every step at which the score changes."""
-    changed = np.flatnonzero(np.any(np.diff(captures, axis=0) != 0, axis=1)) + 1
-    return [[int(step), *map(int, captures[step])] for step in (0, *changed)]
 
 
 def page_meta(record: Record) -> Mapping[str, Any]:

@@ -201,7 +201,7 @@ def results_of(run: Run, settings: TournamentSettings) -> dict[str, Any]:
         "games_played": len(run.rows),
         "games_resumed": run.resumed,
         "warnings": warnings_of(table),
-        "silent": silent_teams(table),
+        "silent": sorted(set(table[(table["steps"] > 0) & (table["usable_steps"] == 0)]["team"])) if len(table) else [],
         "states": [state_results(table, state, settings.labels, settings.penalty, seed) for state in settings.states],
         "prices": priced,
         "goals": goals,
@@ -222,13 +222,6 @@ def warnings_of(table: pd.DataFrame) -> list[str]:
         if missed := int(own["missed_deadlines"].sum()):
             found.append(f"{team} missed {missed:,} deadlines; its games may come out otherwise on another machine.")
     return found
-
-
-def silent_teams(table: pd.DataFrame) -> list[str]:
-    """Teams that gave nothing usable throughout some game."""
-    if table.empty:
-        return []
-    return sorted(set(table[(table["steps"] > 0) & (table["usable_steps"] == 0)]["team"]))
 
 
 def _goals(table: pd.DataFrame, priced: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from steerclear.shield import Shield, ShieldConfig
@@ -19,11 +20,6 @@ def compile_shield() -> None:
     Shield().warm_up()
 
 
-def compile_shield_per_boat() -> None:
-    """Compile the shield that decides for each boat by itself."""
-    Shield(ShieldConfig(coordination="per_boat")).warm_up()
-
-
 def compile_game() -> None:
     """Compile what a game needs."""
     play_match(SHORT_GAME)
@@ -37,27 +33,20 @@ def compile_judge() -> None:
     oracle.judge(states, [boat, boat], own=0, step=13, radius_m=2.5)
 
 
-def compile_encounters() -> None:
-    """Compile what encounters with the shield need."""
+def compile_encounters(guard: str = "shield", judge: bool = True) -> None:
+    """Compile what encounters with a filter need."""
     from .encounters import measure
 
-    measure("rammer_1", n=1)
-
-
-def compile_reachability_filter() -> None:
-    """Compile what encounters with the reachability filter need."""
-    from .encounters import measure
-
-    measure("rammer_1", "reach", n=1, judge=False)
+    measure("rammer_1", guard, n=1, judge=judge)
 
 
 PARTS: dict[str, Callable[[], object]] = {
     "the shield": compile_shield,
-    "the shield, each boat by itself": compile_shield_per_boat,
+    "the shield, each boat by itself": lambda: Shield(ShieldConfig(coordination="per_boat")).warm_up(),
     "the game": compile_game,
     "the judge": compile_judge,
     "encounters": compile_encounters,
-    "the reachability filter": compile_reachability_filter,
+    "the reachability filter": partial(compile_encounters, "reach", judge=False),
 }
 """Everything that commands compile; what one part compiles the next finds."""
 

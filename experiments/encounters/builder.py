@@ -138,7 +138,7 @@ class SceneBuilder:
             row[L.HEADING] = wrapped(row[L.HEADING] + angle_deg)
         self.goals = [[(x * cos + y * sin, y * cos - x * sin) for x, y in line] for line in self.goals]
         for row in (*self.script, *(row for _, row in self.variants)):
-            phases = S.phases_of(row)
+            phases = row[S.PHASE :].reshape(S.PHASES, S.N_PHASE)
             by_heading = phases[:, S.AIM] == S.AIM_HEADING
             phases[by_heading, S.ANGLE_DEG] = wrapped(phases[by_heading, S.ANGLE_DEG] + angle_deg)
 

@@ -27,8 +27,10 @@ Water = tuple[np.ndarray, np.ndarray]
 
 
 def records_with_and_without(scenes: Scenes, guard: str, conditions: Conditions, name: str) -> list[Record]:
-    """The first game of some scenes, played with a filter and without, as records."""
-    return records_of([(play(scenes, one, conditions), one) for one in dict.fromkeys((guard, NONE))], 0, name)
+    """The first game of some scenes, played with a filter and without, as records that show the same water."""
+    played = [(play(scenes, one, conditions), one) for one in dict.fromkeys((guard, NONE))]
+    water = _water_of([one.state[:, 0, :, :2] for one, _ in played], scenes)
+    return [record_of(one, 0, f"{name}, {by}", by != NONE, water) for one, by in played]
 
 
 def replay_worst(worst: Sequence[Mapping[str, Any]], conditions: Conditions, seed: int, path: Path) -> Path:
@@ -39,12 +41,6 @@ def replay_worst(worst: Sequence[Mapping[str, Any]], conditions: Conditions, see
         name = f"{entry['family']} {entry['number']}, {entry['own']} and {entry['other']}"
         records += records_with_and_without(scenes.take([entry["variant"]]), entry["guard"], conditions, name)
     return write_replay(records, path, title="The worst encounters")
-
-
-def records_of(played: Sequence[tuple[Trajectory, str]], game: int, name: str) -> list[Record]:
-    """One game of what was played with filters of some names, as records that show the same water."""
-    water = _water_of([one.state[:, game, :, :2] for one, _ in played], played[0][0].scenes)
-    return [record_of(one, game, f"{name}, {guard}", guard != NONE, water) for one, guard in played]
 
 
 def record_of(played: Trajectory, game: int, title: str, guarded: bool, water: Water | None = None) -> Record:

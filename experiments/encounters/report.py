@@ -52,7 +52,8 @@ def write_encounter_report(results: Mapping[str, Any], path: Path) -> Path:
     """Write the report of what `results.results_of` gives; the replay is linked when ``files`` names one."""
     cells, settings, replay = results["cells"], results["settings"], results["files"].get("replay")
     pairs = dict.fromkeys((cell["own"], cell["other"]) for cell in cells)
-    worst = [[_worst_text(row[name]) for name in WORST] for row in results["worst"]]
+    worst = [[row[name] for name in WORST] for row in results["worst"]]
+    worst = [[f"{value:.2f}" if isinstance(value, float) else plain(value) for value in row] for row in worst]
     conditions = [words.format(settings["conditions"][name]) for name, words in CONDITIONS.items()]
     return Report(
         title="Encounters",
@@ -97,10 +98,6 @@ def _text(cell: Cell, name: str) -> str:
     if name == "avoidable" and cell["not_judged"]:
         text += f" (+{cell['not_judged']} not judged)"
     return f"{text} of {cell['started_outside']}" if name == "breaches_outside" else text
-
-
-def _worst_text(value: Any) -> str:
-    return f"{value:.2f}" if isinstance(value, float) else plain(value)
 
 
 def _plot(family: str, cells: Cells, settings: Mapping[str, Any]) -> Plot:

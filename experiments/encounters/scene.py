@@ -72,11 +72,6 @@ def script(*phases: Array, target: int = -1, authority: bool = False, reached_m:
     return np.concatenate([[target, authority, reached_m], *phases, *never])
 
 
-def phases_of(row: Array) -> Array:
-    """View of a row's phases, (PHASES, N_PHASE)."""
-    return row[PHASE:].reshape(PHASES, N_PHASE)
-
-
 def to_goals(speed_mps: float, reached_m: float) -> Array:
     """Script of a boat that makes for its goals in turn."""
     return script(phase(AIM_GOALS, speed_mps), reached_m=reached_m)

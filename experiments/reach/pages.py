@@ -113,18 +113,13 @@ def _page(title: str, words: str, parts: Sequence[tuple[Mapping[str, Any], Any]]
     return Report(title, "", notes=[words], sections=sections).page("")[1]
 
 
-def played_goals(sets: Sequence[PlayedSet]) -> list[dict[str, Any]]:
-    """The goals over all rows."""
+def played_content(head: Mapping[str, Any], sets: Sequence[PlayedSet]) -> dict[str, Any]:
+    """The sets as JSON, below a run's head; `docs.KEYS` describes it."""
     ratio, beyond = max(one.ratio for one in sets), sum(one.tried_lost for one in sets)
-    return [
+    goals = [
         judged("lost and reachability's set by the latter, largest", ratio, "<=", RATIO_GOAL),
         judged("positions beyond that were lost", float(beyond), "<=", 0.0),
     ]
-
-
-def played_content(head: Mapping[str, Any], sets: Sequence[PlayedSet]) -> dict[str, Any]:
-    """The sets as JSON, below a run's head; `docs.KEYS` describes it."""
-    goals = played_goals(sets)
     rows = [{**asdict(one), "ratio": one.ratio, "player_ratio": one.player_ratio} for one in sets]
     told = {name: head[name] for name in ("command", "settings", "versions", "machine", "wall_s")}
     return {**told, "sets": rows, "goals": goals}

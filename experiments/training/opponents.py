@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from steerclear import policies
-from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
 from steerclear.env.observe import observe_games  # noqa: F401 (its kernel fills the twin's observations)
 from steerclear.policies.entrants.learned import LearnedBatch
@@ -29,7 +28,6 @@ def opponent_of(name: str, every: int = 1) -> Any:
     """Return a batch policy by name; one that cannot play batches plays game by game, every ``every`` steps."""
     if plays_batches(name):
         return policies.make_batch(name)
-    policies.check(name)
     return EachGame(name, every)
 
 
@@ -215,14 +213,11 @@ class EachGame:
         self._left[self._mine] -= 1
         return self._out
 
-    def _seen_as(self, config: GameConfig) -> GameConfig:
-        """Return the rules with steps as long as the time between calls."""
-        return config if self.every == 1 else config.replace(decision_steps=config.decision_steps * self.every)
-
     def _ask(self, core: Any, game: int) -> Array:
         fresh = game not in self._twins
         if fresh:
-            self._twins[game] = MctfEnv(self._seen_as(core.config), action_kind="continuous")
+            rules = core.config.replace(decision_steps=core.config.decision_steps * self.every)
+            self._twins[game] = MctfEnv(rules, action_kind="continuous")
             self._twins[game].reset(seed=0)
         env = self._twins[game]
         env.core.restore(core.view(game))

@@ -350,16 +350,11 @@ def _ppo(config: Config, env: TrainEnv) -> PPO:
         seed=config.seed,
     )
     model.set_logger(Logger(None, []))
-    _hold_actor_back(model, ppo.critic_first * ppo.epochs)
-    return model
 
-
-def _hold_actor_back(model: PPO, updates: int) -> None:
-    """Let the actor learn nothing in the first updates: the critic learns alone."""
-
-    def held_back(gradient: torch.Tensor) -> torch.Tensor:
-        return torch.zeros_like(gradient) if model._n_updates < updates else gradient
+    def held_back(gradient: torch.Tensor) -> torch.Tensor:  # in the first updates the critic learns alone
+        return torch.zeros_like(gradient) if model._n_updates < ppo.critic_first * ppo.epochs else gradient
 
     for name, parameter in model.policy.named_parameters():
         if "policy" in name or name.startswith(("action_net", "log_std")):
             parameter.register_hook(held_back)
+    return model

@@ -140,7 +140,8 @@ class QmixTraining(Training):
         games, options = self.config.games, self.config.options
         with torch.no_grad():
             best = self.agent(torch.as_tensor(seen)).argmax(1).numpy()
-        random = self._rng.random(len(best)) < self._exploration()
+        end, whole = options.explore_end, max(1.0, options.explore_share * self.total)
+        random = self._rng.random(len(best)) < max(end, 1.0 - (1.0 - end) * self.decisions / whole)
         actions = np.where(random, self._rng.integers(0, len(DISCRETE), len(best)), best)
         out = self.env.decide(actions)
         shape = (games, self.boats, -1)
@@ -156,10 +157,6 @@ class QmixTraining(Training):
             if not np.isfinite(loss):
                 raise DivergedError("options.rate")
         return out.observations, loss
-
-    def _exploration(self) -> float:
-        end, share = self.config.options.explore_end, self.config.options.explore_share
-        return max(end, 1.0 - (1.0 - end) * self.decisions / max(1.0, share * self.total))
 
     def _note(self, losses: list[float], nets: list[float], began: float, evaluate: bool = False) -> None:
         row = {"decisions": self.decisions, "loss": float(np.mean(losses)), "net": float(np.mean(nets))}

@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 from json_keys import KEYS, undocumented
 from steerclear.experiments.bench import POLICIES, BenchSettings, bench_goals, bench_tables, run_bench
-from steerclear.experiments.bench_measures import BatchSize, solver_times
+from steerclear.experiments.bench_measures import BatchSize, programs_of, questions_of_games, solver_times
 from steerclear.experiments.docs import write_pages
 from steerclear.experiments.result_files import finite, write_json
+from steerclear.shield import ShieldConfig
 from steerclear.shield.filter.program import Program
 
 TINY = replace(
@@ -95,6 +96,10 @@ def test_goals_judge_the_slowest_policy_without_a_shield_and_medium_with_one(con
     )
     assert [goal["met"] for goal in goals] == [True, False, False, True, False, *[True] * 4, False, True, False]
     assert [goal["value"] for goal in goals[4:9]] == pytest.approx([2e5, 8.5e4, 1.9, 8.5e4, 1.9])
+
+
+def test_programs_are_those_that_the_shield_solves_in_games():
+    assert len(programs_of(questions_of_games("aamas2024", 20.0, 0, ShieldConfig()), ShieldConfig(), 3, 0)) == 3
 
 
 def test_solvers_are_held_against_each_other_on_the_same_programs():

@@ -57,6 +57,9 @@ def test_a_game_that_cannot_be_played_is_told_and_the_rest_is_kept(error, code, 
     assert "Traceback" not in done.output
     content = json.loads(Path("out/results.json").read_text())
     assert content["games_played"] == 6
+    nothing = run("ablate", "--opponents", "hold", *TINY, "--out", "none")
+    assert (nothing.exit_code, "A hit is" in nothing.stdout) == (code, False)
+    assert not Path("none/results.json").exists()
     about = {"pairing": "medium vs hold", "game": 0, "shielded": False, "state": "off", "fault": error is FAULT}
     assert {**content["failed"][0], "error": ""} == {**about, "error": ""}
 

@@ -119,6 +119,7 @@ def test_what_no_page_can_be_made_of_is_refused(tmp_path):
         ),
         ([evaluation] * 2, r"two of the results make evaluation_aamas2024\.md; give them one at a time"),
         ([ablation({}, 1.0, 0.0)], "make them again"),
+        ([content(cell("bold", "head_on"), cell("shy", "rammer_1"))], "have no family that all guards met"),
     ):
         with pytest.raises(ConfigError, match=words):
             write_pages(contents, tmp_path)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from steerclear.env.record import find_breaches, read_meta
 from steerclear.experiments.replay_html import SCRIPTS, at_one_radius, pack, write_replay
+from steerclear.shield.exceptions import ConfigError
 
 NODE = shutil.which("node")
 
@@ -124,6 +125,8 @@ def test_texts_from_a_record_cannot_break_out_of_the_page(game_record, tmp_path)
 def test_several_games_are_named_apart_and_share_one_own_team(game_record, tmp_path):
     off = {**game_record, "meta": np.array(json.dumps({**read_meta(game_record), "shielded": []}))}
     red = {**game_record, "meta": np.array(json.dumps({**read_meta(game_record), "shielded": ["agent_2"]}))}
+    with pytest.raises(ConfigError, match="no record to replay"):
+        write_replay([], tmp_path / "a.html")
     games = games_in(write_replay([off, game_record, game_record], tmp_path / "a.html"))
     assert [game["title"] for game in games] == [
         "medium – easy, shield off",

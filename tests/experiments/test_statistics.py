@@ -93,6 +93,7 @@ def test_a_ratio_of_counts_turned_round_has_its_limits_turned_round(off, on):
 
 
 def test_means_of_games_that_are_all_alike_have_no_limits_and_differences_of_counts_those_of_their_rates():
+    assert math.isnan(mean_interval([]).value)
     alike = mean_interval([2.0] * 8)
     assert alike.value == 2.0
     assert math.isnan(alike.low)

@@ -87,6 +87,7 @@ def test_results_rows_report_and_page_hold_what_they_say(tmp_path):
     for words in ("Standings, no shields", "Standings, all shielded", "Price of safety, a game"):
         assert words in html
         assert words in text
+    assert "; not complete: no shields 2 games" in write_markdown({**content, "complete": False}, tmp_path)[1]
     assert '<img alt="net captures against collisions' in html
     tables = html.split('<section class="tables">')[1]
     wide = tables.count('<section class="card wide"><h3>')  # which scroll

@@ -35,6 +35,8 @@ def test_a_small_run_from_end_to_end_and_again():
     second = json.loads(Path("copy.json").read_text())
     assert second["encounters_resumed"] == 6
     assert second["cells"] == content["cells"]
+    assert run(*SMALL, "--guard", "none", "--no-judge", "--out", "quick").exit_code == ExitCode.OK
+    assert " not judged)" in Path("quick/report.html").read_text()
 
 
 def test_the_same_scenes_for_every_guard_and_exit_status_one_for_avoidable_breaches(monkeypatch):

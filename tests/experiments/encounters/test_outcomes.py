@@ -23,6 +23,7 @@ from steerclear.experiments.encounters.outcomes import (
 from steerclear.experiments.encounters.scene import read_scene, write_scene
 from steerclear.experiments.statistics import upper_bound
 from steerclear.shield import Reason
+from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import layout as L
 
 USUAL, NEVER, OWN = Conditions(), np.nan, 20
@@ -156,6 +157,11 @@ def test_a_damaged_scene_is_refused(tmp_path, change, words):
     with pytest.raises(Exception, match=words) as caught:
         read_scene(path)
     assert type(caught.value).__name__ in ("ConfigError", "PlatformError")
+
+
+def test_encounters_are_counted_from_0_on():
+    with pytest.raises(ConfigError, match="encounters -1 to -1 cannot be drawn"):
+        draw("head_on", "heron", "heron", USUAL, 0, -1, 1)
 
 
 class Meddler(NoFilter):

@@ -96,6 +96,15 @@ def test_a_model_plays_in_its_own_process_as_in_ours(game, tmp_path):
     assert here == apart
 
 
+def test_an_entry_cannot_be_asked_without_what_its_game_tells(game, write_entry):
+    env, observations, _ = game
+    team = make_team(write_entry("return 4"))
+    team.reset(env, ["agent_0"], 0)
+    with pytest.raises(PolicyError, match="pass those of MctfEnv"):
+        team.act(observations, {})
+    team.close()
+
+
 def test_where_nothing_can_be_put_apart_it_plays_here_and_that_is_said(write_entry, monkeypatch, caplog):
     monkeypatch.delattr(sandbox.os, "fork")
     entry_team._say_once.cache_clear()

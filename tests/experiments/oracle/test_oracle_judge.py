@@ -251,6 +251,7 @@ def test_states_that_are_not_finite_but_for_a_controller_that_has_not_run(run, p
     [
         ({"states": np.zeros((5, 2, 2))}, r"shape \(steps \+ 1, boats, 11\)"),
         ({"states": [[["x"] * 11] * 2] * 3}, "must be numbers"),
+        ({"states": np.zeros((1, 2, 11))}, "two boats and at least one step"),
         ({"radius_m": 0.0}, "radius_m is 0.0; give a positive"),
         ({"dt_s": -0.1}, "dt_s is -0.1; give a positive"),
         ({"own": 2}, r"no boat 2; the record's boats are 0..1"),

@@ -40,6 +40,7 @@ TEAMS = sorted((ROOT / "policies" / "entrants" / "learned" / "teams").glob("*.ya
         ({"algorithm": "cloning", "decisions": 3}, "algorithm cloning has no use for decisions; leave it out"),
         ({"algorithm": "raids", "shield_every": 10}, "algorithm raids has no use for shield_every"),
         ({"algorithm": "raids", "stages": [{"net": 1.0}]}, "algorithm raids has no use for stages.net"),
+        ({"algorithm": "raids", "options": {"rate": 1.0}}, "algorithm raids has no use for options.rate; leave it out"),
         ({"algorithm": "raids", "options": {"share": [1]}}, "unknown key 'options.share'; did you mean shares"),
         ({"algorithm": "raids", "options": {"shares": [0, 0, 0, 0, 0, 0]}}, "give one above 0"),
     ],
