@@ -67,13 +67,14 @@ def as_tlog(path, rows, systems=(1,), every=1, top=lambda time_s: 3.0, before_fi
                 if top(row[0]) != told:
                     told = top(row[0])
                     put(boat, mavlink.MAVLink_param_value_message(b"WP_SPEED", told, 9, 1, 0), row[0])
+                if component is not None:
+                    put(ground, messages_of((*row[:5], 0.0, 0.0), 9, 3.0)[2], row[0])
                 put(ground, command, row[0])
                 if k % every == 0:
                     put(boat, attitude, row[0])
                     put(boat, place, row[0])
                     if component is not None:
                         put(mavlink.MAVLink(None, 1, component), place_message(100, 100), row[0])
-                        put(ground, messages_of((*row[:5], 0.0, 0.0), 9, 3.0)[2], row[0])
 
 
 def place_message(latitude, longitude, *more):
