@@ -20,6 +20,16 @@ def test_those_who_beat_the_learner_come_more_often():
     assert 0.85 < draws.count("easy") / 600 < 0.97
 
 
+def test_a_game_that_ended_counts_as_won_drawn_or_lost_by_the_learner():
+    core = core_of(config_of({}), 3, 0)
+    core.reset(seed=0)
+    pool = Pool(Stage(opponents=("hold",)), League(), 0)
+    pool.reset(core, 1, 0)
+    core.captures[:] = [[2, 0], [1, 1], [0, 1]]
+    pool.ended(core, np.array([True, True, True]))
+    assert list(pool.scores["hold"]) == [1.0, 0.5, 0.0]
+
+
 def test_a_game_keeps_its_opponent_to_its_end():
     """Also a snapshot that made room for a later one: it is drawn no more."""
     core = core_of(config_of({}), 20, 0)
