@@ -12,6 +12,7 @@ from ..commands import Commands
 from ..decision import Decisions
 from ..exceptions import ConfigError, FleetError, PolicyError
 from ..fleet import Fleet
+from ..platforms import layout as L
 from ..shield import Shield
 from .checks import Serving, ShieldedGame, one_game_shield, words_of
 from .readers import GameReader, reader_of
@@ -154,15 +155,15 @@ class ShieldedCallable:
         self.read = read
         self.decisions: Decisions | None = None
         self._serving = Serving(shield)
-        self._relative = True
+        self._relative = False
         self._failure = ""
 
     def __call__(self, seen: Any) -> Commands:
         """Return filtered commands, in the frame of the policy's last usable answer.
 
         If the policy raises or answers something else, all boats hold. A command that is not finite makes its own boat
-        hold. The decision's reason says so, and the log once for each failure. Before the first usable answer the frame
-        is that of `Commands.relative_deg`.
+        hold. The decision's reason says so, and the log once for each failure. Boats that the shield does not decide
+        for get speed 0 and their heading. Before the first usable answer the frame is that of `Commands.absolute_rad`.
 
         Raises:
             ConfigError: the shield serves another function, team or game since its last `Shield.reset`.
@@ -183,8 +184,11 @@ class ShieldedCallable:
             self._relative = wanted.relative
         except Exception as error:  # whatever the policy does, its boats must get commands
             self._note(f"{type(error).__name__}: {error}; all boats hold")
-            nothing = np.full((len(fleet), 2), np.nan)
-            wanted = Commands.relative_deg(nothing) if self._relative else Commands.absolute_rad(nothing)
+            stop = np.zeros((len(fleet), 2))
+            if not self._relative:
+                stop[:, 1] = np.radians(fleet.state[:, L.HEADING])
+            stop[fleet.controlled] = np.nan
+            wanted = Commands.relative_deg(stop) if self._relative else Commands.absolute_rad(stop)
         self.decisions = self.shield.decide(fleet, wanted)
         return self.decisions.filtered
 

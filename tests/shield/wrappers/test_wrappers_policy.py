@@ -160,7 +160,7 @@ def test_a_function_that_fails_is_answered_for_in_its_own_frame(caplog):
     answers[4:4] = [Commands.absolute_rad([[2.0, 0.0], [2.0, np.pi]])]
     told, team = iter(answers), Shield().wrap(lambda gap_m: next(told), read=near)
     sent = [team(60.0) for _ in answers]
-    assert [one.relative for one in sent] == [True] + [False] * 7
+    assert [one.relative for one in sent] == [False] * 8
     np.testing.assert_allclose(sent[2].values[0], [0.0, 0.0], atol=1e-12)
     assert team.decisions[0].reason == Reason.HELD
     failed = [record.message for record in caplog.records if "failed" in record.message]
@@ -182,3 +182,19 @@ def test_a_policy_that_answers_nothing_is_told_what_to_answer():
     team.reset(env, OWN, 0)
     with pytest.raises(PolicyError, match="answered NoneType; let act return a mapping"):
         team.act({}, {})
+
+
+def test_a_function_that_fails_at_first_is_answered_in_absolute_headings_and_its_loop_can_go_on():
+    def failing(seen):
+        raise RuntimeError("out of order")
+
+    fleet = Fleet.of(
+        position_m=[[0, 0], [0, 30]], heading_deg=[90, 180], speed_mps=[1, 1], team=[0, 1], platforms="heron"
+    )
+    shielded = Shield().wrap(failing, read=lambda seen: seen)
+    filtered = shielded(fleet)
+    assert not filtered.relative
+    assert np.isfinite(filtered.values).all()
+    assert filtered.values[1, 0] == 0.0
+    assert np.cos(filtered.values[1, 1]) == pytest.approx(-1.0)
+    assert [decision.reason.name for decision in shielded.decisions] == ["HELD", "NOT_COVERED"]
