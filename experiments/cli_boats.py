@@ -191,10 +191,10 @@ def deploy(
     check_seed(what.seed)
     if how.boat is not None and fleet is None:
         demo_fleet(demo.link).commanded(how.boat)  # before its boats are simulated
-    told = {"minutes": minutes, "seed": what.seed, "trust": what.trust, "begun_unix_s": time.time()}
+    settings = {"minutes": minutes, "seed": what.seed, "trust": what.trust, "begun_unix_s": time.time()}
     if demo.demo:  # simulated boats on this machine obey at once
-        told |= {"untold_delay_s": 0.0} | ({"connect_s": max(how.wait, 60.0)} if how.wait > 0.0 else {})
-    orders = how.orders(fleet or Path(), policy, **told)
+        settings |= {"unknown_delay_s": 0.0} | ({"connect_s": max(how.wait, 60.0)} if how.wait > 0.0 else {})
+    orders = how.orders(fleet or Path(), policy, **settings)
     if fleet is None:  # a folder, once all else is sound
         orders = replace(orders, fleet_file=demo_file(link=demo.link))
     file = load_fleet(orders.fleet_file)

@@ -151,8 +151,8 @@ def sim_boats(
     _show_boats(content, files)
     if json_file is not None:
         given = {**vars(how), **vars(sea), **vars(radio), **vars(hulls), "fault": hulls.fault or []}
-        told = {name: value for name, value in given.items() if name not in ("demo", "allow_remote", "with_parent")}
-        settings = {"fleet": None if fleet is None else str(fleet), **told}
+        chosen = {name: value for name, value in given.items() if name not in ("demo", "allow_remote", "with_parent")}
+        settings = {"fleet": None if fleet is None else str(fleet), **chosen}
         wall_s = time.perf_counter() - started
         write_json(json_file, {**content, "settings": settings, "wall_s": wall_s, "files": files})
     if cut_short and duration is not None:

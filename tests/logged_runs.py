@@ -89,7 +89,7 @@ class Encounter:
         for number in range(self.steps):
             tick = self.tick(number)
             yield self.edit(tick)
-            obeyed = tick.decisions.filtered if self.shielded else tick.wanted
+            obeyed = tick.decisions.filtered if self.shielded else tick.nominal
             for i in range(4):
                 speed, heading = obeyed.absolute(i, tick.fleet.heading_rad[i])
                 error = (math.degrees(heading) - self.state[i, L.HEADING] + 180.0) % 360.0 - 180.0
@@ -117,7 +117,7 @@ class Encounter:
             readings={name: reading_of(name, self.state[i], now_s) for i, name in enumerate(NAMES[:2])},
             contacts=tuple(contact_of(name, self.state[i], now_s) for i, name in enumerate(NAMES) if i >= 2),
             fleet=fleet,
-            wanted=wanted,
+            nominal=wanted,
             surroundings=fixed,
             decisions=decisions,
             shield_reset=reset,

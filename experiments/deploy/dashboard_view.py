@@ -342,9 +342,9 @@ def _other(contact: Contact | None, now_s: float, limit_s: float) -> dict[str, A
     if contact is None:
         return {"hdg": "-", "m/s": "-", "age": Text("never", "red"), "why": Text("not heard", "red")}
     age_s = now_s - contact.fixed_s
-    told = Text(f"by {contact.source}, error {contact.error_m:.1f} m", "dim")
+    source = Text(f"by {contact.source}, error {contact.error_m:.1f} m", "dim")
     age = Text(_age(age_s), "bold red" if age_s > limit_s else "")
-    return {**_seen(contact, age), "why": Text("contact", "dim"), "closest": told}
+    return {**_seen(contact, age), "why": Text("contact", "dim"), "closest": source}
 
 
 def _seen(boat: BoatReading | Contact, age: Text) -> dict[str, Any]:

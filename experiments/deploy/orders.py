@@ -154,7 +154,7 @@ class Orders:
     connect_s: float = CONNECT_S  # how long to wait for boats, s
     trust: bool = False  # also load a model stored among other teams' entries
     # delay from command to effect if neither file, drill nor fit gives it, s; None: one step
-    untold_delay_s: float | None = None
+    unknown_delay_s: float | None = None
     begun_unix_s: float | None = None  # start time that names all files, s since 1970; None: when they are opened
 
     def __post_init__(self) -> None:
@@ -208,17 +208,17 @@ def read_fleet(orders: Orders) -> tuple[FleetFile, str]:
         raise FleetFileError(f"{orders.fleet_file}: {why}")
     if fleet.signing is not None:
         read_key(fleet.signing.key_file)
-    return with_delay(fleet, orders.boat, orders.untold_delay_s), text
+    return with_delay(fleet, orders.boat, orders.unknown_delay_s), text
 
 
-def with_delay(fleet: FleetFile, boat: str | None = None, untold_s: float | None = None) -> FleetFile:
+def with_delay(fleet: FleetFile, boat: str | None = None, unknown_s: float | None = None) -> FleetFile:
     """Return the file with a delay: its own, else the last drill's, else the longest of its platform files."""
     if "delay_s" in fleet.shield:
         return fleet
     delay_s = measured_delay_s(fleet, boat)
     if delay_s is None:
         fitted = [fleet.measured_of(entry.name).get("delay_s", 0.0) for entry in fleet.commanded(boat)]
-        delay_s = max(fleet.dt_s if untold_s is None else untold_s, *fitted)
+        delay_s = max(fleet.dt_s if unknown_s is None else unknown_s, *fitted)
     return fleet.with_shield(delay_s=delay_s)
 
 

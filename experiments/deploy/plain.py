@@ -100,7 +100,7 @@ class PlainLines:
         self._tick: Tick | None = None
         self._began_s = math.nan
         self._tally = Tally()
-        self._told: set[tuple[str, str, str]] = set()
+        self._shown: set[tuple[str, str, str]] = set()
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._run, name="plain lines", daemon=True)
         self._thread.start()
@@ -131,9 +131,9 @@ class PlainLines:
             self._say(f"{_say('time', tick.began_s - self._began_s)}  {', '.join(said)}")
             new = {(action.subject, action.condition, action.response): action.text for action in tick.actions}
             for key, text in new.items():
-                if key not in self._told or key[1] == "geofence":
+                if key not in self._shown or key[1] == "geofence":
                     self._say(_say("effect", text))
-            self._told = set(new)
+            self._shown = set(new)
 
 
 def _say(name: str, *values: object) -> str:

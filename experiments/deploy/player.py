@@ -157,13 +157,13 @@ class Observer:
 
     def _with_game(self, view: Any, game: GameState, lost: Array) -> Any:
         """Add the referee's game state to the view; a carried flag is at its carrier if that boat was seen."""
-        told = {"is_tagged": "tagged", "tagging_cooldown_s": "cooldown_s"}
-        told |= {name: name for name in ("has_flag", "oob", "on_side", "driven")}
-        arrays = {name: np.array(getattr(view, name)) for name in told}
+        reported = {"is_tagged": "tagged", "tagging_cooldown_s": "cooldown_s"}
+        reported |= {name: name for name in ("has_flag", "oob", "on_side", "driven")}
+        arrays = {name: np.array(getattr(view, name)) for name in reported}
         for i, name in enumerate(self.cast.players):
             status = game.boats.get(name)
             if status is not None and not lost[i]:
-                for array, key in told.items():
+                for array, key in reported.items():
                     arrays[array][i] = getattr(status, key)
         cooldown = arrays["tagging_cooldown_s"]
         np.minimum(cooldown, self.cast.config.tagging_cooldown_s, out=cooldown)

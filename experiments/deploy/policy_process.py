@@ -36,7 +36,7 @@ HEALTHY_S = 30.0  # after answering for this long, a policy's next restart uses 
 
 
 class PolicyProcess(Closing):
-    """A `WantedSource`: sends snapshots to a policy's process and returns its latest answer. A context manager.
+    """A `NominalSource`: sends snapshots to a policy's process and returns its latest answer. A context manager.
 
     At most one snapshot is in flight; of later ones only the latest waits. A policy that dies or does not answer within
     ``deadline_s`` is ended with all processes it started, and restarted after a pause.

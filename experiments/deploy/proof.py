@@ -163,7 +163,7 @@ class Prover:
             proof.unfounded += one.decided is None
             values = ["none" if value is None else exact(value) for value in (one.decided, one.sent)]
             proof.first_sent = proof.first_sent or self._difference(tick, one.boat, one.what, *values)
-        if tick.fleet is None or tick.wanted is None or tick.decisions is None:
+        if tick.fleet is None or tick.nominal is None or tick.decisions is None:
             return
         boats = (tick.fleet.platforms, tick.fleet.names, tick.fleet.team.tobytes())
         self._known |= tick.shield_reset or (self._boats is not None and boats != self._boats)

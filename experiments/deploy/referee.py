@@ -137,7 +137,7 @@ class Umpire:
         elif not self.over:
             before = self.core.view()
             self.core.follow(seen[np.newaxis], max(0.0, now_s - self._at_s))
-            self.events = tuple(self._told(before))
+            self.events = tuple(self._events_since(before))
             note = f"lost, so out of bounds: {', '.join(lost)}" if lost else ""
         self._at_s = now_s
         return self.state(note)
@@ -157,21 +157,21 @@ class Umpire:
             self.core.commands(np.zeros((1, len(self.names), 2)))  # updates which boats are game-controlled
         return state_of(self.core, self.names, note)
 
-    def _told(self, before: Any) -> list[str]:
-        core, told = self.core, []
+    def _events_since(self, before: Any) -> list[str]:
+        core, events = self.core, []
         for i, name in enumerate(self.names):
             if core.made_tag[0, i] >= 0:
-                told.append(f"{name} tags {self.names[core.made_tag[0, i]]}")
+                events.append(f"{name} tags {self.names[core.made_tag[0, i]]}")
             if core.has_flag[0, i] and not before.has_flag[i]:
-                told.append(f"{name} grabs the flag")
+                events.append(f"{name} grabs the flag")
             if core.oob[0, i] and not before.oob[i]:
-                told.append(f"{name} is out of bounds")
+                events.append(f"{name} is out of bounds")
             if before.is_tagged[i] and not core.is_tagged[0, i]:
-                told.append(f"{name} is free again")
+                events.append(f"{name} is free again")
         for team, side in enumerate(SIDES):
             if core.events[0, team, CAPTURE]:
-                told.append(f"{side} captures the flag: {core.captures[0, 0]} : {core.captures[0, 1]}")
-        return [*told, "the game is over"] if self.over else told
+                events.append(f"{side} captures the flag: {core.captures[0, 0]} : {core.captures[0, 1]}")
+        return [*events, "the game is over"] if self.over else events
 
 
 def state_of(core: BatchedMctf, names: Sequence[str], note: str = "") -> GameState:
@@ -189,7 +189,7 @@ def state_of(core: BatchedMctf, names: Sequence[str], note: str = "") -> GameSta
 
 RATE_HZ = 10.0
 LINGER_S = 3.0  # how long the end of a game is published, s
-Told = Callable[[GameState, Sequence[str]], None]
+OnState = Callable[[GameState, Sequence[str]], None]
 """Called each time with the state of the game and what happened, a line each."""
 
 
@@ -243,7 +243,7 @@ class Referee(Closing):
         return state
 
     def run(
-        self, told: Told, stopped: Callable[[], bool], rate_hz: float = RATE_HZ, limit_s: float | None = None
+        self, on_state: OnState, stopped: Callable[[], bool], rate_hz: float = RATE_HZ, limit_s: float | None = None
     ) -> str:
         """Run until the game is over, ``stopped()`` is true (checked before each turn), or ``limit_s`` has passed.
 
@@ -254,7 +254,7 @@ class Referee(Closing):
         over_s: float | None = None
         while not stopped():
             state = self.turn()
-            told(state, self.umpire.events)
+            on_state(state, self.umpire.events)
             now_s = self.clock.now_s()
             if state.over:
                 over_s = now_s if over_s is None else over_s

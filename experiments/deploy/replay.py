@@ -134,10 +134,10 @@ def judge(replay: Replay) -> None:
 def as_content(replay: Replay) -> dict[str, Any]:
     """The report as JSON-ready content, see `keys.REPLAY`."""
     proof = replay.proof
-    told = ("began", "seconds", "complete", "made_by", "proved", "damage", "origin")
+    shown = ("began", "seconds", "complete", "made_by", "proved", "damage", "origin")
     chain = ("chained", "keyed", "codes_checked", "broken", "breaks")
     return {
-        **{name: getattr(replay, name) for name in told},
+        **{name: getattr(replay, name) for name in shown},
         "policy": replay.header.policy,
         "chain": {name: getattr(replay.chain, name) for name in chain},
         **{name: count for name, count in asdict(proof).items() if name not in ("covered", "first")},

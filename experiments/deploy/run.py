@@ -24,7 +24,7 @@ from steerclear.shield.bridge.feed import FeedSender, PositionPublisher
 from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.link_checks import check_fence, link_checks
 from steerclear.shield.bridge.mavlink.vehicle import MavlinkLink
-from steerclear.shield.bridge.messages import TickSink, WantedSource
+from steerclear.shield.bridge.messages import NominalSource, TickSink
 from steerclear.shield.bridge.moos.checks import moos_checks
 from steerclear.shield.bridge.moos.links import POLICY as MOOS_POLICY
 from steerclear.shield.bridge.moos.links import MoosNominal
@@ -83,7 +83,7 @@ class Boats:
 
     def sail(
         self,
-        nominal: WantedSource,
+        nominal: NominalSource,
         seconds: float | None,
         sinks: Sequence[TickSink] = (),
         *,

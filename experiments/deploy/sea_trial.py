@@ -91,7 +91,7 @@ MANOEUVRES: tuple[tuple[str, float, Steer], ...] = (
 
 
 class SeaTrial:
-    """A `WantedSource` and a `TickSink`.
+    """A `NominalSource` and a `TickSink`.
 
     Args:
         fleet: the file.
@@ -129,7 +129,7 @@ class SeaTrial:
         return not self._left
 
     def offer(self, snapshot: Snapshot) -> None:
-        """See `WantedSource`."""
+        """See `NominalSource`."""
         values = np.column_stack([np.zeros(len(snapshot.seen)), np.radians(snapshot.seen[:, 2])])
         if self._left:
             i = self._fleet.names.index(self._left[0][0])
@@ -138,7 +138,7 @@ class SeaTrial:
         self._commands = Commands.absolute_rad(values)
 
     def latest(self) -> Answer:
-        """See `WantedSource`."""
+        """See `NominalSource`."""
         return Answer() if self._commands is None else Answer(self._commands, 0.0)
 
     def take(self, tick: Tick) -> None:

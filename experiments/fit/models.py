@@ -67,10 +67,10 @@ class Seen:
     def of(cls, runs: Sequence[Run]) -> Seen:
         """Return the extremes of some runs, outliers left out."""
         speed = np.concatenate([run.seen[:, 3] for run in runs])
-        told = max(float(run.told[:, 0].max()) for run in runs)
+        fastest = max(float(run.commanded[:, 0].max()) for run in runs)
         gains = np.concatenate([_slope(run.seen[:, 3], 0.5) for run in runs])
         rates = np.concatenate([np.abs(run.seen[:, 4]) for run in runs])
-        top = max(0.05, min(told, *(_held(run) for run in runs)))
+        top = max(0.05, min(fastest, *(_held(run) for run in runs)))
         slow = rates[np.abs(speed) < SLOW_SHARE * top]
         bends = np.concatenate([np.abs(_slope(run.seen[:, 4], 0.3)) for run in runs])
         return cls(
@@ -89,9 +89,14 @@ def _held(run: Run) -> float:
     if len(run.seen) <= over:
         return np.inf
     gained = np.abs(run.seen[over:, 3] - run.seen[:-over, 3])
-    told = np.min([run.told[k : len(run.told) - over + k, 0] for k in range(0, over + 1, 5)], axis=0)
+    commanded = np.min([run.commanded[k : len(run.commanded) - over + k, 0] for k in range(0, over + 1, 5)], axis=0)
     turned = np.abs(run.seen[over:, 2] - run.seen[:-over, 2])
-    held = (gained < HELD_MPS) & (turned < 5.0) & (told > run.seen[over:, 3] + FASTER_MPS) & (run.seen[over:, 3] > 0.3)
+    held = (
+        (gained < HELD_MPS)
+        & (turned < 5.0)
+        & (commanded > run.seen[over:, 3] + FASTER_MPS)
+        & (run.seen[over:, 3] > 0.3)
+    )
     return float(np.median(run.seen[over:, 3][held])) if held.sum() >= 5 else np.inf
 
 
@@ -127,7 +132,7 @@ class Model:
     def around(self, seen: Seen) -> Model:
         """Return the model with first guesses and bounds from what was seen of the boat."""
         twice = 2.0 if self.kind == "usv" else 1.0  # a usv averages old and new speed: half as quick
-        told = {
+        commanded = {
             "max_acc": (twice * seen.acc_mps2, 0.5, 4.0),
             "max_dec": (twice * seen.dec_mps2, 0.5, 4.0),
             "max_turn_rate_dps": (seen.turn_rate_dps, 0.9, 1.1),
@@ -136,8 +141,8 @@ class Model:
         }
         bounds, guess = [], {}
         for name, value, low, high in self.bounds:
-            if name in told:
-                middle, below, above = told[name]
+            if name in commanded:
+                middle, below, above = commanded[name]
                 value = guess[name] = min(max(middle, low), high)
                 low, high = max(low, below * value), min(high, above * value + 1e-3)
             bounds.append((name, value, low, high))
@@ -201,16 +206,16 @@ MODELS = {"rate": RATE, "usv": USV}
 
 
 @kernel
-def _relative(heading_deg: float, told_deg: float) -> float:
-    return (told_deg - heading_deg + 180.0) % 360.0 - 180.0
+def _relative(heading_deg: float, commanded_deg: float) -> float:
+    return (commanded_deg - heading_deg + 180.0) % 360.0 - 180.0
 
 
 @kernel
-def predict(params: Array, thrust: Array, seen: Array, told: Array, every: int, ahead: int, out: Array) -> None:
+def predict(params: Array, thrust: Array, seen: Array, commanded: Array, every: int, ahead: int, out: Array) -> None:
     """Fill ``out`` (windows, ahead, 4) with predicted x, y, unwrapped heading and speed, 1, 2, ... steps ahead.
 
     Before each step the model is set to the seen state (k, 5) and keeps its controllers' memory. Window w begins at
-    step w * every. The memory starts with the thrust (1,), percent. ``told`` (k, 2) are the commands in effect.
+    step w * every. The memory starts with the thrust (1,), percent. ``commanded`` (k, 2) are the commands in effect.
     """
     row, window = np.zeros(L.N_STATE), np.zeros(L.N_STATE)
     row[L.THRUST] = thrust[0]
@@ -222,20 +227,20 @@ def predict(params: Array, thrust: Array, seen: Array, told: Array, every: int, 
             window[:] = row
             heading = seen[k, 2]
             for step in range(ahead):
-                at = min(k + step, told.shape[0] - 1)
+                at = min(k + step, commanded.shape[0] - 1)
                 before = window[L.HEADING]
-                step_boat(params, window, told[at, 0], _relative(before, told[at, 1]), STEP_S)
+                step_boat(params, window, commanded[at, 0], _relative(before, commanded[at, 1]), STEP_S)
                 heading += _relative(before, window[L.HEADING])
                 place = out[k // every, step]
                 place[0], place[1], place[2], place[3] = window[L.X], window[L.Y], heading, window[L.SPEED]
-        step_boat(params, row, told[k, 0], _relative(row[L.HEADING], told[k, 1]), STEP_S)
+        step_boat(params, row, commanded[k, 0], _relative(row[L.HEADING], commanded[k, 1]), STEP_S)
 
 
 def delayed(run: Run, delay_s: float) -> Array:
     """Return the commands in effect in each step after a delay; fractions of a step are interpolated."""
-    steps = np.arange(len(run.told))
+    steps = np.arange(len(run.commanded))
     at = steps - delay_s / STEP_S
-    return np.column_stack([np.interp(at, steps, column) for column in run.told.T])
+    return np.column_stack([np.interp(at, steps, column) for column in run.commanded.T])
 
 
 def errors_of(params: Array, run: Run, delay_s: float, every: int, ahead: int) -> Array:

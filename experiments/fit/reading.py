@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from steerclear.shield.bridge.blackbox import LogReader
 
-from .runs import NEEDED, SEEN, TOLD, FitError, Run, Streams, Tell, spans, untold
+from .runs import COMMANDED, NEEDED, SEEN, FitError, Notice, Run, Streams, silent, spans
 
 EARTH_M = 6378137.0
 POSITION, TOP_SPEED = "GLOBAL_POSITION_INT", ("WP_SPEED", "CRUISE_SPEED")
@@ -24,8 +24,8 @@ COMMANDS = ("SET_ATTITUDE_TARGET", "SET_POSITION_TARGET_LOCAL_NED")
 TLOG_NAMES = {
     **dict.fromkeys(SEEN, POSITION),
     "heading": f"ATTITUDE or {POSITION}",
-    "told_speed": f"{COMMANDS[0]} with the parameter WP_SPEED, or {COMMANDS[1]}",
-    "told_heading": " or ".join(COMMANDS),
+    "commanded_speed": f"{COMMANDS[0]} with the parameter WP_SPEED, or {COMMANDS[1]}",
+    "commanded_heading": " or ".join(COMMANDS),
 }
 BIN_NAMES = dict(zip(NEEDED, ("POS", "POS", "ATT.Yaw", "GPS.Spd", "THR.DesSpeed", "NTUN.DesYaw"), strict=True))
 BIN_FIELDS = {name.partition(".")[0]: (what, name.partition(".")[2]) for what, name in BIN_NAMES.items() if "." in name}
@@ -34,15 +34,21 @@ NO_HEADING, FIX_3D = 65535, 3
 LONGEST_RUN_S = 30.0  # longer runs are cut into pieces, so that some can be held out
 FEWEST_RUNS, FEWEST_TURNING_DEG, FEWEST_SPEED_MPS = 3, 20.0, 0.3
 CHANGED_SHARE = 0.4
-"""A stop, or a start, is seen where the boat's speed changes by so much of its top speed while it is told to."""
+"""A stop, or a start, is seen where the boat's speed changes by so much of its top speed while it is commanded to."""
 COLUMNS: dict[str, tuple[str, tuple[str, ...]]] = {
     "time": ("time", ("t_s", "time_s", "t", "time")),
     "x": ("x (east)", ("x_m", "east_m", "nav_x", "y_e")),
     "y": ("y (north)", ("y_m", "north_m", "nav_y", "x_n")),
     "heading": ("heading", ("heading_deg", "nav_heading", "yaw_deg_unwrapped", "yaw_deg")),
     "speed": ("speed", ("speed_mps", "nav_speed", "fwd_speed")),
-    "told_speed": ("speed told", ("told_speed_mps", "cmd_speed_mps", "cmd_speed", "des_speed")),
-    "told_heading": ("heading told", ("told_heading_deg", "cmd_heading_deg", "des_heading")),
+    "commanded_speed": (
+        "speed commanded",
+        ("commanded_speed_mps", "told_speed_mps", "cmd_speed_mps", "cmd_speed", "des_speed"),
+    ),
+    "commanded_heading": (
+        "heading commanded",
+        ("commanded_heading_deg", "told_heading_deg", "cmd_heading_deg", "des_heading"),
+    ),
 }
 """Columns of a CSV of steps: in words, and the names that each may have."""
 MOOS_NAMES = ("NAV_X", "NAV_Y", "NAV_HEADING", "NAV_SPEED", "DESIRED_SPEED", "DESIRED_HEADING")
@@ -51,7 +57,7 @@ HELM_HOLDS_S = 5.0  # the helm of MOOS-IvP posts desired values when they change
 
 
 def read_logs(
-    paths: Sequence[Path], boat: str | None = None, system_id: int | None = None, tell: Tell = untold
+    paths: Sequence[Path], boat: str | None = None, system_id: int | None = None, notice: Notice = silent
 ) -> list[Run]:
     """Read runs of all logs, long ones in pieces.
 
@@ -59,13 +65,13 @@ def read_logs(
         paths: of the logs.
         boat: name of the boat, of a black box with several.
         system_id: of the boat, of a telemetry log with several.
-        tell: is told what of a log is left out, and why.
+        notice: gets a sentence about what of a log is left out, and why.
 
     Raises:
         FitError: a log cannot be read or contradicts itself, or together they show too little to fit.
         LogError: it is no black-box log.
     """
-    readers: dict[str, Callable[[Path, Tell], list[Run]]] = {
+    readers: dict[str, Callable[[Path, Notice], list[Run]]] = {
         ".csv": read_csv,
         ".tlog": partial(read_tlog, system_id=system_id),
         ".bin": read_bin,
@@ -78,13 +84,13 @@ def read_logs(
             raise FitError(f"{path.name} is no log that can be read; give {', '.join(readers)}")
         if not path.is_file():
             raise FitError(f"there is no log {path}")
-        runs += readers[path.suffix.lower()](path, tell)
+        runs += readers[path.suffix.lower()](path, notice)
     pieces = [run.part(a, b) for run in runs for a, b in run.bounds(LONGEST_RUN_S)]
     _check_enough(runs, len(pieces))
     return pieces
 
 
-def read_csv(path: Path, tell: Tell) -> list[Run]:
+def read_csv(path: Path, notice: Notice) -> list[Run]:
     """Read a CSV of steps, a row a time, columns known by their names."""
     try:
         with path.open(newline="", encoding="utf-8-sig", errors="replace") as file:
@@ -102,7 +108,7 @@ def read_csv(path: Path, tell: Tell) -> list[Run]:
             raise FitError(f"{path.name} has no column for {words}; name one {' or '.join(names)}")
     if len(rows) == 1:
         raise FitError(f"{path.name} has no rows; give a CSV of steps")
-    streams = Streams(path.stem, tell)
+    streams = Streams(path.stem, notice)
     for number, row in rows[1:]:
         try:
             values = {what: float(row[found[0]]) for what, found in places.items()}
@@ -114,9 +120,9 @@ def read_csv(path: Path, tell: Tell) -> list[Run]:
     return streams.runs({what: words for what, (words, _) in COLUMNS.items()}, sampled=True)
 
 
-def read_alog(path: Path, tell: Tell) -> list[Run]:
+def read_alog(path: Path, notice: Notice) -> list[Run]:
     """Read MOOS-IvP's ``.alog``: a line a posting, ``time variable source value``."""
-    streams = Streams(path.stem, tell)
+    streams = Streams(path.stem, notice)
     with path.open(encoding="utf-8", errors="replace") as file:
         for line in file:
             parts = line.split()
@@ -131,13 +137,13 @@ def read_alog(path: Path, tell: Tell) -> list[Run]:
     return streams.runs({what: name for name, what in VARIABLES.items()}, HELM_HOLDS_S)
 
 
-def read_box(path: Path, tell: Tell, boat: str | None = None) -> list[Run]:
+def read_box(path: Path, notice: Notice, boat: str | None = None) -> list[Run]:
     """Read one boat of a black box of ours; readings count from when they were true."""
     boats: dict[str, Streams] = {}
     with LogReader(path) as log:
         for tick in log.ticks():
             for name, reading in tick.readings.items():
-                streams = boats.setdefault(name, Streams(path.stem, tell))
+                streams = boats.setdefault(name, Streams(path.stem, notice))
                 if math.isfinite(reading.age_s):
                     streams.clock(reading.read_s)
                     x_m, y_m = reading.position_m
@@ -147,12 +153,12 @@ def read_box(path: Path, tell: Tell, boat: str | None = None) -> list[Run]:
             for name, sent in tick.sent.items():
                 if sent.delivered and math.isfinite(sent.heading_rad) and math.isfinite(sent.speed_mps):
                     streams, heading_deg = (
-                        boats.setdefault(name, Streams(path.stem, tell)),
+                        boats.setdefault(name, Streams(path.stem, notice)),
                         math.degrees(sent.heading_rad),
                     )
-                    streams.add_all(sent.sent_s, told_heading=heading_deg, told_speed=sent.speed_mps)
+                    streams.add_all(sent.sent_s, commanded_heading=heading_deg, commanded_speed=sent.speed_mps)
     name = _chosen(path, sorted(boats), boat, "--boat")
-    return boats[name].runs(dict.fromkeys(SEEN, "readings") | dict.fromkeys(TOLD, "commands sent"))
+    return boats[name].runs(dict.fromkeys(SEEN, "readings") | dict.fromkeys(COMMANDED, "commands sent"))
 
 
 def _chosen(path: Path, known: Sequence[Any], asked: Any, option: str) -> Any:
@@ -165,7 +171,7 @@ def _chosen(path: Path, known: Sequence[Any], asked: Any, option: str) -> Any:
     return known[0] if asked is None else asked
 
 
-def read_tlog(path: Path, tell: Tell, system_id: int | None = None) -> list[Run]:
+def read_tlog(path: Path, notice: Notice, system_id: int | None = None) -> list[Run]:
     """Read one boat of a telemetry log."""
     kept = [m for m in _messages(path) if m.get_type() in (*COMMANDS, POSITION, "ATTITUDE", "PARAM_VALUE")]
     sources = Counter(_source(m) for m in kept if m.get_type() == POSITION and _is_place(m.lat, m.lon))
@@ -177,7 +183,7 @@ def read_tlog(path: Path, tell: Tell, system_id: int | None = None) -> list[Run]
     origin = _middle([(m.lat, m.lon) for m in said if m.get_type() == POSITION])
     tops = [[(_time_s(m), m.param_value) for m in said if _parameter(m) == name] for name in TOP_SPEED]
     has_attitude = any(m.get_type() == "ATTITUDE" for m in said)
-    streams, heading_deg = Streams(path.stem, tell), math.nan
+    streams, heading_deg = Streams(path.stem, notice), math.nan
     for m in kept:
         kind, time_s = m.get_type(), _time_s(m)
         streams.clock(time_s)
@@ -205,20 +211,20 @@ def _command(m: Any, tops: Sequence[Sequence[tuple[float, float]]], time_s: floa
     if m.get_type() == COMMANDS[1]:
         if m.type_mask != MASK_VELOCITY_ONLY:
             return {}
-        return {"told_heading": math.degrees(math.atan2(m.vy, m.vx)), "told_speed": math.hypot(m.vx, m.vy)}
+        return {"commanded_heading": math.degrees(math.atan2(m.vy, m.vx)), "commanded_speed": math.hypot(m.vx, m.vy)}
     if m.type_mask != MASK_IGNORES_RATES or not math.isfinite(top_mps := _top_mps(tops, time_s)):
         return {}
     w, x, y, z = m.q
     yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    return {"told_heading": math.degrees(yaw), "told_speed": m.thrust * top_mps}
+    return {"commanded_heading": math.degrees(yaw), "commanded_speed": m.thrust * top_mps}
 
 
 def _top_mps(tops: Sequence[Sequence[tuple[float, float]]], time_s: float) -> float:
-    """Speed of full thrust at a time; before it was first told only if it is the same all along, else NaN."""
-    for told in tops:
-        at = bisect_right([when_s for when_s, _ in told], time_s)
-        known = told[at - 1 : at] or (told[:1] if len({value for _, value in told}) == 1 else [])
-        if not known and told:
+    """Speed of full thrust at a time; before it was first set only if it is the same all along, else NaN."""
+    for settings in tops:
+        at = bisect_right([when_s for when_s, _ in settings], time_s)
+        known = settings[at - 1 : at] or (settings[:1] if len({value for _, value in settings}) == 1 else [])
+        if not known and settings:
             return math.nan
         if known and known[0][1] > 0.0:
             return known[0][1]
@@ -255,13 +261,13 @@ def place_m(origin: tuple[float, float], latitude_deg: float, longitude_deg: flo
     return math.radians(longitude_deg - origin[1]) * EARTH_M * math.cos(math.radians(origin[0])), north
 
 
-def read_bin(path: Path, tell: Tell) -> list[Run]:
+def read_bin(path: Path, notice: Notice) -> list[Run]:
     """Read an ArduPilot log; of several GPS receivers the one that most often has a fix."""
     kept = [message for message in _messages(path) if message.get_type() in ("POS", *BIN_FIELDS)]
     origin = _middle([_raw_place(m) for m in kept if m.get_type() == "POS"])
     receivers = Counter(getattr(m, "I", 0) for m in kept if m.get_type() == "GPS" and _has_fix(m))
     receiver = max(receivers, key=lambda number: (receivers[number], -number), default=0)
-    streams = Streams(path.stem, tell)
+    streams = Streams(path.stem, notice)
     for m in kept:
         kind = m.get_type()
         what, name = BIN_FIELDS.get(kind, ("", ""))
@@ -312,8 +318,8 @@ def _check_enough(runs: Sequence[Run], pieces: int) -> None:
             f"{changed:.2f} m/s; {remedy}"
         )
     for sign, words, unknown in (
-        (-1.0, "told to stop and slow down", "way to stop"),
-        (1.0, "told to go and gain speed", "acceleration"),
+        (-1.0, "commanded to stop and slow down", "way to stop"),
+        (1.0, "commanded to go and gain speed", "acceleration"),
     ):
         seen = max(_changed(run, sign, top) for run in runs)
         if seen < CHANGED_SHARE * top:
@@ -324,6 +330,6 @@ def _check_enough(runs: Sequence[Run], pieces: int) -> None:
 
 
 def _changed(run: Run, sign: float, top_mps: float) -> float:
-    """Most that speed fell (sign -1) or rose (1) while told to go slower, or faster, than half of top speed, m/s."""
-    asked = spans(sign * (run.told[:, 0] - 0.5 * top_mps) >= 0.0)
+    """Most that speed fell (sign -1) or rose (1) while commanded slower, or faster, than half of top speed, m/s."""
+    asked = spans(sign * (run.commanded[:, 0] - 0.5 * top_mps) >= 0.0)
     return max((float((sign * (run.seen[a:b, 3] - run.seen[a, 3])).max()) for a, b in asked), default=0.0)

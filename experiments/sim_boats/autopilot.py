@@ -201,11 +201,11 @@ def _reboot(boat: Autopilot, message: Any) -> int:
 
 _COMMANDS: dict[int, Callable[[Autopilot, Any], int]] = {
     mavlink.MAV_CMD_COMPONENT_ARM_DISARM: _arm,
-    mavlink.MAV_CMD_DO_SET_MODE: lambda boat, told: _change_mode(boat, int(told.param1), told.param2),
-    mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: lambda boat, told: (
-        ACCEPTED if boat.streams.set_interval(int(told.param1), told.param2) else FAILED
+    mavlink.MAV_CMD_DO_SET_MODE: lambda boat, order: _change_mode(boat, int(order.param1), order.param2),
+    mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: lambda boat, order: (
+        ACCEPTED if boat.streams.set_interval(int(order.param1), order.param2) else FAILED
     ),
-    mavlink.MAV_CMD_REQUEST_MESSAGE: lambda boat, told: boat._send_now(int(told.param1)),
+    mavlink.MAV_CMD_REQUEST_MESSAGE: lambda boat, order: boat._send_now(int(order.param1)),
     mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: _reboot,
 }
 """What each of COMMAND_LONG and COMMAND_INT does and how it is acknowledged; any other is unsupported."""

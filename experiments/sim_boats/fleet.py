@@ -125,34 +125,34 @@ class SimFleet(Closing):
     def __init__(self, boats: Sequence[SimBoat], **settings: Any) -> None:
         if not boats or len({boat.name for boat in boats}) < len(boats):
             raise ConfigError("give at least one boat, each with a name of its own")
-        told = SimSettings(**settings)
-        self.frame = FieldFrame(*told.origin, told.y_axis_deg)
-        self.clock: Clock = MonotonicClock(told.speed) if told.clock is None else told.clock
+        chosen = SimSettings(**settings)
+        self.frame = FieldFrame(*chosen.origin, chosen.y_axis_deg)
+        self.clock: Clock = MonotonicClock(chosen.speed) if chosen.clock is None else chosen.clock
         self.let_go_s = self.cpu_s = 0.0
         self._lock, self._ends, self._ticks = threading.RLock(), threading.Event(), 0
         self._thread: threading.Thread | None = None
         self.boats: dict[str, Boat] = {}
-        self._ports = Ports(told.allow_remote)
+        self._ports = Ports(chosen.allow_remote)
         self._hub: PositionHub | None = None
-        config = game_of(boats, told.preset, told.rules)
+        config = game_of(boats, chosen.preset, chosen.rules)
         warp = float(getattr(self.clock, "speed", 1.0))
-        setting = Setting(self.frame, told.autopilot, told.radio, told.noise, told.key, warp)
+        setting = Setting(self.frame, chosen.autopilot, chosen.radio, chosen.noise, chosen.key, warp)
         try:
-            places = start_places(boats, config, told.seed if told.random_start else None)
-            seeds = np.random.SeedSequence(told.seed).spawn(len(boats))
+            places = start_places(boats, config, chosen.seed if chosen.random_start else None)
+            seeds = np.random.SeedSequence(chosen.seed).spawn(len(boats))
             for i, (spec, place) in enumerate(zip(boats, places, strict=True)):
                 self.boats[spec.name] = boat = Boat(spec, place, spec.system_id or i + 1, setting, seeds[i])
                 self._ports.plug_in(boat)
-            if told.feed_to:
-                listeners = [near(to, told.allow_remote) for to in told.feed_to]
-                self._hub = PositionHub(listeners, self.frame, told.noise, told.key)
+            if chosen.feed_to:
+                listeners = [near(to, chosen.allow_remote) for to in chosen.feed_to]
+                self._hub = PositionHub(listeners, self.frame, chosen.noise, chosen.key)
             everyone = list(self.boats.values())
             players = [everyone[i] for i in playing(boats)]
             driven = {i: boat.spec.policy for i, boat in enumerate(players) if boat.spec.policy}
-            game = None if config is None else Game(config, driven, told.seed)
-            weather = Weather(told.water, self.frame, np.random.default_rng([told.seed, 0x9057]))
-            radius_m = told.separation_m if told.record else None
-            self._world = World(everyone, weather, game, players, self._hub, told.waits, radius_m)
+            game = None if config is None else Game(config, driven, chosen.seed)
+            weather = Weather(chosen.water, self.frame, np.random.default_rng([chosen.seed, 0x9057]))
+            radius_m = chosen.separation_m if chosen.record else None
+            self._world = World(everyone, weather, game, players, self._hub, chosen.waits, radius_m)
         except BaseException:
             self.close()
             raise

@@ -181,12 +181,12 @@ class Hull:
             self.forget()
         self._move(move, abs(speed_mps), turn_deg)
 
-    def _move(self, move: Callable[..., None], *told: Any) -> None:
+    def _move(self, move: Callable[..., None], *command: Any) -> None:
         """One step of the dynamics; astern it is the same hull turned round."""
         turned = 180.0 if self.astern else 0.0
         if turned:
             self.state[L.HEADING] = wrap_degrees(float(self.state[L.HEADING]) + turned)
-        move(self.params, self.state, *told, STEP_S)
+        move(self.params, self.state, *command, STEP_S)
         if turned:
             self.state[L.HEADING] = wrap_degrees(float(self.state[L.HEADING]) + turned)
 

@@ -125,8 +125,8 @@ class TruthRecord:
 
     def step(self, orders: Sequence[Order], headings_deg: Array, marks: Sequence[Mark]) -> None:
         """Record a step: the orders, the headings before it, and the marks of all boats."""
-        told = np.array([_told(order, heading) for order, heading in zip(orders, headings_deg, strict=True)])
-        self._recorder.step(self._game.core.view(), told, told)
+        commands = np.array([_command_of(order, heading) for order, heading in zip(orders, headings_deg, strict=True)])
+        self._recorder.step(self._game.core.view(), commands, commands)
         self._log.step(self._game.core)
         self._marks.append(marks)
 
@@ -171,7 +171,7 @@ def record_of(truth: TruthRecord | None) -> TruthRecord:
     return truth
 
 
-def _told(order: Order, heading_deg: float) -> tuple[float, float]:
+def _command_of(order: Order, heading_deg: float) -> tuple[float, float]:
     """Return the speed in m/s and absolute heading in deg of an order."""
     heading, speed = heading_deg, 0.0
     match order:

@@ -37,7 +37,7 @@ class Steered:
     """Inputs and outputs of one decision, see `messages.Tick`; ``beyond``: boats beyond the hard line."""
 
     fleet: Fleet | None = None
-    wanted: Commands | None = None
+    nominal: Commands | None = None
     surroundings: Surroundings | None = None
     decisions: Decisions | None = None
     shield_reset: bool = False
@@ -64,7 +64,7 @@ class CommandPipeline:
         answer: Commands | None,
         verdict: Verdict,
         surroundings: Surroundings,
-        mates: Collection[str] = (),
+        teammates: Collection[str] = (),
     ) -> Steered:
         """Decide and send for all boats of this process.
 
@@ -73,12 +73,12 @@ class CommandPipeline:
             answer: the policy's absolute commands for all boats of the file; used for boats without a response due.
             verdict: responses due, boats in unknown state, boats that do not obey.
             surroundings: current static constraints.
-            mates: teammates that other processes command, with their own shields.
+            teammates: teammates that other processes command, with their own shields.
         """
         commanded = [name for name in self._links if name not in verdict.unknown and name not in verdict.idle]
         so_far = Steered()
         try:
-            fleet = tracker.assemble({*commanded, *mates}, verdict.dropped)
+            fleet = tracker.assemble({*commanded, *teammates}, verdict.dropped)
             so_far = Steered(fleet)
             if fleet is None or not commanded:
                 return self._finish(so_far, verdict)
@@ -110,7 +110,7 @@ class CommandPipeline:
                     values[i] = answer.values[self._file.names.index(name)]
                 else:
                     response = "stop" if response == "go_on" else response
-                    values[i] = self._responders[name].wanted(response, fleet.state[i])
+                    values[i] = self._responders[name].nominal(response, fleet.state[i])
             elif fleet.controlled[i]:  # a teammate with its own shield: assumed to hold its course
                 values[i] = max(0.0, fleet.state[i, L.SPEED]), math.radians(fleet.state[i, L.HEADING]) % TWO_PI
         return Commands.absolute_rad(values)

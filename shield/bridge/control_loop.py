@@ -27,10 +27,10 @@ from .messages import (
     BoatReading,
     ContactSource,
     Link,
+    NominalSource,
     Snapshot,
     Tick,
     TickSink,
-    WantedSource,
     contacts_heard,
 )
 from .model_error import ModelErrorMonitor
@@ -53,12 +53,12 @@ class Parts:
     """What the loop works with."""
 
     links: Mapping[str, Link]  # of the boats this process commands, connected and prepared
-    policy: WantedSource  # where nominal commands come from
+    policy: NominalSource  # where nominal commands come from
     # links that are only listened to, of boats somebody else commands
-    ears: Mapping[str, Link] = field(default_factory=dict)
+    listen_only: Mapping[str, Link] = field(default_factory=dict)
     contacts: Sequence[ContactSource] = ()  # other sources of positions
     game: GameSource | None = None  # the referee's state of the game; None: none
-    grounds: Surroundings = OPEN_WATER  # static constraints of the game, see `StaticObstacles`
+    surroundings: Surroundings = OPEN_WATER  # static constraints of the game, see `StaticObstacles`
     sinks: Sequence[TickSink] = ()  # get every tick; the black box among them
 
 
@@ -80,13 +80,13 @@ class ControlLoop:
         self.failsafe = Failsafe(fleet, self.tracker)
         self.model_error = ModelErrorMonitor(fleet, tuple(parts.links))
         self.near: tuple[str, ...] = ()
-        self._obstacles = StaticObstacles(fleet, parts.grounds)
+        self._obstacles = StaticObstacles(fleet, parts.surroundings)
         chosen = Shield(fleet.shield_config, self._obstacles.forms[0]) if shield is None else shield
         self._pipeline = CommandPipeline(fleet, chosen, parts.links, clock)
         self._reacquisition = Reacquisition(parts.links)
         self._has_referee = fleet.feed is not None and fleet.feed.referee is not None and parts.game is not None
         per_boat = fleet.coordination != "team"
-        self._mates = tuple(boat.name for boat in fleet.ours if per_boat and boat.name not in parts.links)
+        self._teammates = tuple(boat.name for boat in fleet.ours if per_boat and boat.name not in parts.links)
         self._number, self._broke_s, self._ending = 0, -math.inf, ""
         self._readings: dict[str, BoatReading] = {}
         self._decided: Decisions | None = None
@@ -146,7 +146,7 @@ class ControlLoop:
         """One turn, due at that time."""
         began, parts = self.clock.now_s(), self.parts
         self._readings = readings = {name: link.read() for name, link in parts.links.items()}
-        contacts = contacts_heard(parts.contacts, parts.ears, self.fleet.shield_config.position_error_m)
+        contacts = contacts_heard(parts.contacts, parts.listen_only, self.fleet.shield_config.position_error_m)
         self.tracker.update(began, readings, contacts)
         self.model_error.update(self.tracker.own_rows(), readings)
         self.tracker.margin_m = self.model_error.margin_m
@@ -167,7 +167,7 @@ class ControlLoop:
             readings=readings,
             contacts=contacts,
             fleet=steered.fleet,
-            wanted=steered.wanted,
+            nominal=steered.nominal,
             surroundings=steered.surroundings,
             decisions=steered.decisions,
             shield_reset=steered.shield_reset,
@@ -216,10 +216,10 @@ class ControlLoop:
         if self.operator.hard:
             return Steered(sent=self._pipeline.stop_all(tuple(self.parts.links)))
         limit = self.fleet.limits.contact.max_age_s
-        sure = [name for name in self._mates if not self.tracker.contradicted(name)]
-        mates = {name for name in sure if self.tracker.contact_age_s(name) <= limit}
+        certain = [name for name in self._teammates if not self.tracker.contradicted(name)]
+        teammates = {name for name in certain if self.tracker.contact_age_s(name) <= limit}
         around = self._obstacles.around(game, game_age_s)
-        return self._pipeline.steer(self.tracker, answer, verdict, around, mates)
+        return self._pipeline.steer(self.tracker, answer, verdict, around, teammates)
 
     def _retake(self, verdict: Verdict, now_s: float) -> None:
         """Take back boats the operator asks for, and those whose fail-safe is over where the file says so."""
@@ -228,7 +228,7 @@ class ControlLoop:
         asked = {boat for boat, _ in requests}
         self.failsafe.handed_over -= asked
         requests += [(boat, "after_failsafe") for boat in sorted(verdict.retake - asked) if not why_not]
-        self._reacquisition.look(requests, self._readings, now_s, why_not)
+        self._reacquisition.start(requests, self._readings, now_s, why_not)
 
     def _record(self, tick: Tick) -> None:
         """Give a tick to all sinks, whatever one of them does; one that can keep no more is named once."""
@@ -257,7 +257,7 @@ class Overruns:
     """
 
     def __init__(self, dt_s: float) -> None:
-        self._dt_s, self._told_s = dt_s, -math.inf
+        self._dt_s, self._logged_s = dt_s, -math.inf
         self.turns, self.late, self.missed, self.worst_s = 0, 0, 0, 0.0
 
     def next_due(self, due_s: float, now_s: float) -> float:
@@ -271,8 +271,8 @@ class Overruns:
             return due
         missed = int((now_s - due) / self._dt_s) + 1
         self.late, self.missed, self.worst_s = self.late + 1, self.missed + missed, max(self.worst_s, now_s - due)
-        if now_s - self._told_s >= LATE_EVERY_S:
-            self._told_s = now_s
+        if now_s - self._logged_s >= LATE_EVERY_S:
+            self._logged_s = now_s
             LOG.warning("the loop fell behind by %.0f ms; %d turns left out", 1e3 * (now_s - due), missed)
         return due + missed * self._dt_s
 
@@ -287,10 +287,10 @@ class Reacquisition:
         self._links = links
         self._threads: dict[str, threading.Thread] = {}
         self._off = threading.Event()
-        self._told: dict[str, tuple[float, str]] = {}
+        self._notes: dict[str, tuple[float, str]] = {}
         self._ended: dict[str, str] = {}
 
-    def look(
+    def start(
         self, requests: Iterable[tuple[str, str]], readings: Mapping[str, BoatReading], now_s: float, why_not: str = ""
     ) -> None:
         """Begin what is asked for (boats, and who asked); with ``why_not`` not, and what is under way is called off."""
@@ -300,23 +300,23 @@ class Reacquisition:
             self._off = threading.Event()  # what was called off stays so: it has the old one
         for boat, by in requests:
             if why_not:
-                self._told[boat] = now_s, f"{boat} is not taken back: {why_not}"
+                self._notes[boat] = now_s, f"{boat} is not taken back: {why_not}"
             elif boat not in self._links or readings[boat].ready:
                 why = "it obeys" if boat in self._links else "it is not commanded here"
-                self._told[boat] = now_s, f"{boat} need not be taken back: {why}"
-            elif boat not in self._threads and not (by == "after_failsafe" and boat in self._told):
-                self._told[boat] = now_s, f"{boat} is being taken back, asked for by {by}"
+                self._notes[boat] = now_s, f"{boat} need not be taken back: {why}"
+            elif boat not in self._threads and not (by == "after_failsafe" and boat in self._notes):
+                self._notes[boat] = now_s, f"{boat} is being taken back, asked for by {by}"
                 thread = threading.Thread(target=self._take, args=(boat, self._off), name=f"take {boat}", daemon=True)
                 self._threads[boat] = thread
                 thread.start()
         for boat in [boat for boat, thread in self._threads.items() if not thread.is_alive()]:
             del self._threads[boat]
-            self._told[boat] = now_s, self._ended.pop(boat, f"{boat}: not taken back, see the log")
+            self._notes[boat] = now_s, self._ended.pop(boat, f"{boat}: not taken back, see the log")
 
     def actions(self, now_s: float) -> tuple[Action, ...]:
         """What is under way, and what came of it lately, for the record and the display."""
-        lasting = {b: told for b, told in self._told.items() if b in self._threads or now_s - told[0] <= RETOLD_S}
-        self._told = lasting
+        lasting = {b: note for b, note in self._notes.items() if b in self._threads or now_s - note[0] <= RETOLD_S}
+        self._notes = lasting
         return tuple(Action(boat, "take_back", "none", text) for boat, (_, text) in lasting.items())
 
     def close(self) -> None:

@@ -46,9 +46,9 @@ LONGEST_DELAY_STEPS = 8
 LONGEST_DELAY_S = 0.6
 SLOWER = 0.6
 """A boat that turns at so much less than its model's rate is slow, not late, though the two look alike at first."""
-SAME_S = 0.005  # delays that are told apart by less are told as the same, s
+SAME_S = 0.005  # delays closer than this are reported as the same, s
 TURNED_DEG = 15.0
-LONG_ENOUGH_S = 3.0  # only where a heading was told for so long it is judged whether the boat turned away from it
+LONG_ENOUGH_S = 3.0  # only where a heading was commanded for so long it is judged whether the boat turned away from it
 MOST_CHANGED = 0.4  # of a drill with a greater share of commands changed too little is left to judge
 
 
@@ -66,7 +66,7 @@ class DrillSample:
 
 
 class Drill:
-    """A `WantedSource` and a `TickSink`: boats are drilled in order; all others of the process lie still.
+    """A `NominalSource` and a `TickSink`: boats are drilled in order; all others of the process lie still.
 
     Attributes:
         seconds: how long it takes.
@@ -83,7 +83,7 @@ class Drill:
         self._commands: Commands | None = None
 
     def offer(self, snapshot: Snapshot) -> None:
-        """See `WantedSource`."""
+        """See `NominalSource`."""
         if math.isnan(self._began_s):
             self._began_s = snapshot.taken_s
         values = np.column_stack([np.zeros(len(snapshot.seen)), np.radians(snapshot.seen[:, 2])])
@@ -94,7 +94,7 @@ class Drill:
         self._commands = Commands.absolute_rad(values)
 
     def latest(self) -> Answer:
-        """See `WantedSource`."""
+        """See `NominalSource`."""
         return Answer() if self._commands is None else Answer(self._commands, 0.0)
 
     def take(self, tick: Tick) -> None:
@@ -102,8 +102,10 @@ class Drill:
         boat, _ = self.turn_of(tick.began_s)
         reading, sent = tick.readings.get(boat), tick.sent.get(boat)
         if reading is not None:
-            told = (math.nan, math.nan) if sent is None else (sent.heading_rad, sent.speed_mps)
-            self.samples[boat].append(DrillSample(tick.began_s, reading, *told, self._is_changed(boat, tick, told)))
+            command = (math.nan, math.nan) if sent is None else (sent.heading_rad, sent.speed_mps)
+            self.samples[boat].append(
+                DrillSample(tick.began_s, reading, *command, self._is_changed(boat, tick, command))
+            )
 
     def turn_of(self, time_s: float) -> tuple[str, float]:
         """Whose turn it is and for how long already, s; no name before and after."""
@@ -115,7 +117,7 @@ class Drill:
     def close(self) -> None:
         """Nothing is held."""
 
-    def _is_changed(self, boat: str, tick: Tick, told: tuple[float, float]) -> bool:
+    def _is_changed(self, boat: str, tick: Tick, command: tuple[float, float]) -> bool:
         """Whether the tick's command is not the drill's; what the link made of it, such as a cap, does not count."""
         if self._commands is None:
             return True
@@ -124,7 +126,7 @@ class Drill:
             i = tick.fleet.names.index(boat)
             decided = tick.decisions.filtered.absolute(i, tick.fleet.heading_rad[i])
         else:
-            decided = told[1], told[0]
+            decided = command[1], command[0]
         turned = abs((decided[1] - heading + math.pi) % (2.0 * math.pi) - math.pi)
         return not (abs(decided[0] - speed) <= SAME_MPS and turned <= SAME_RAD)
 
@@ -269,20 +271,20 @@ class _Fit:
 def check_response(boat: str, samples: Sequence[DrillSample], platform: Platform, dt_s: float) -> CheckResult:
     """The boat did what its platform file foretells of the commands sent."""
     name = f"response:{boat}"
-    told = [s for s in samples if math.isfinite(s.heading_rad) and math.isfinite(s.speed_mps)]
-    measured = np.array([_measured(s) for s in told])
-    if len(told) < 5.0 / dt_s or not np.isfinite(measured).all():
+    commanded = [s for s in samples if math.isfinite(s.heading_rad) and math.isfinite(s.speed_mps)]
+    measured = np.array([_measured(s) for s in commanded])
+    if len(commanded) < 5.0 / dt_s or not np.isfinite(measured).all():
         text = "commands or telemetry were missing during the drill; see the other checks, then run again"
         return CheckResult(name, False, text)
-    changed = float(np.mean([s.changed for s in told]))
-    stretches = _stretches(told, dt_s)
+    changed = float(np.mean([s.changed for s in commanded]))
+    stretches = _stretches(commanded, dt_s)
     if changed > MOST_CHANGED or not stretches:
         text = (
             f"the drill was disturbed: {100.0 * changed:.0f} % of its commands were changed by the shield or a "
             "declared response, too little is left to judge; clear the water, then run again"
         )
         return CheckResult(name, False, text, {"changed_share": changed})
-    fits = [_fit(told, measured, platform, dt_s, steps) for steps in range(LONGEST_DELAY_STEPS + 1)]
+    fits = [_fit(commanded, measured, platform, dt_s, steps) for steps in range(LONGEST_DELAY_STEPS + 1)]
     fit, delay_s = min(fits, key=lambda f: f.cost), _delay_s([f.heading_deg**2 for f in fits], dt_s)
     figures = {
         "delay_s": delay_s,
@@ -297,7 +299,9 @@ def check_response(boat: str, samples: Sequence[DrillSample], platform: Platform
         f"as {platform.name}: heading within {fit.heading_deg:.1f} deg rms, speed within {fit.speed_mps:.2f} m/s rms, "
         f"effect after {delay_s:.2f} s{disturbed}{counted_words(delay_s, dt_s)}",
         figures,
-        *_faults(fit, delay_s, measured, any(_turned_away(measured[part], told[part]) for part in stretches), platform),
+        *_faults(
+            fit, delay_s, measured, any(_turned_away(measured[part], commanded[part]) for part in stretches), platform
+        ),
     )
     if not passed and changed:
         text += f"{disturbed}: repeat it on clear water before you believe it"
@@ -319,15 +323,15 @@ def _measured(sample: DrillSample) -> tuple[float, float]:
     return math.degrees(reading.heading_rad + (turned if math.isfinite(turned) else 0.0)), reading.speed_mps
 
 
-def _fit(told: Sequence[DrillSample], measured: Array, platform: Platform, dt_s: float, steps: int) -> _Fit:
+def _fit(commanded: Sequence[DrillSample], measured: Array, platform: Platform, dt_s: float, steps: int) -> _Fit:
     """Run the platform's model on the commands sent, taking effect ``steps`` later."""
     params = platform.pack()
     row = fresh_state(0.0, 0.0, _half_turn(measured[0, 0]), measured[0, 1])
     foretold = np.empty_like(measured)
-    for i in range(len(told)):
+    for i in range(len(commanded)):
         foretold[i] = row[L.HEADING], row[L.SPEED]
         if i >= steps:
-            command = told[i - steps]
+            command = commanded[i - steps]
             error = _half_turn(math.degrees(command.heading_rad) - row[L.HEADING])
             step_boat(params, row, command.speed_mps, error, dt_s)
     heading = _half_turn(measured[:, 0] - foretold[:, 0])
@@ -374,13 +378,13 @@ def _faults(fit: _Fit, delay_s: float, measured: Array, away: bool, platform: Pl
     ]
 
 
-def _stretches(told: Sequence[DrillSample], dt_s: float) -> list[slice]:
+def _stretches(commanded: Sequence[DrillSample], dt_s: float) -> list[slice]:
     """Where the drill's own command to go one way was sent for long enough without a break."""
     stretches, begin = [], 0
-    for i in range(len(told) + 1):
-        on = i < len(told) and not told[i].changed and told[i].speed_mps > 0.0
+    for i in range(len(commanded) + 1):
+        on = i < len(commanded) and not commanded[i].changed and commanded[i].speed_mps > 0.0
         if on:
-            turned_deg = abs(float(_half_turn(math.degrees(told[i].heading_rad - told[begin].heading_rad))))
+            turned_deg = abs(float(_half_turn(math.degrees(commanded[i].heading_rad - commanded[begin].heading_rad))))
             if i == begin or turned_deg <= TURNED_DEG:
                 continue
         if (i - begin) * dt_s >= LONG_ENOUGH_S:
@@ -389,10 +393,10 @@ def _stretches(told: Sequence[DrillSample], dt_s: float) -> list[slice]:
     return stretches
 
 
-def _turned_away(measured: Array, told: Sequence[DrillSample]) -> bool:
-    """Whether in a stretch it ended farther from the heading told than it began."""
-    wanted = math.degrees(told[-1].heading_rad)
-    first, last = (abs(_half_turn(measured[i, 0] - wanted)) for i in (0, -1))
+def _turned_away(measured: Array, commanded: Sequence[DrillSample]) -> bool:
+    """Whether in a stretch it ended farther from the heading commanded than it began."""
+    course_deg = math.degrees(commanded[-1].heading_rad)
+    first, last = (abs(_half_turn(measured[i, 0] - course_deg)) for i in (0, -1))
     return bool(last > first + TURNED_DEG)
 
 

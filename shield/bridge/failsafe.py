@@ -254,7 +254,7 @@ class Responder:
         """End the response."""
         self._onset = None
 
-    def wanted(self, response: str, row: Array) -> tuple[float, float]:
+    def nominal(self, response: str, row: Array) -> tuple[float, float]:
         """Return the nominal speed, m/s, and absolute heading, rad, of a response other than "go_on"."""
         if self._onset is None or self._response != response:
             self._response, self._onset = response, row.copy()

@@ -62,7 +62,7 @@ PACKETS_PER_S, FORGED_COST = 1000.0, 0.1
 looked into and costs less."""
 FAR_M = 20_000.0  # a boat further from the field than this is an error of the sender
 LATE_S = 0.5  # sealed packets later than this, beside the sender's quickest, are told
-MAX_SENDERS, MAX_BOATS_TOLD, MAX_SOURCES = 64, 256, 8
+MAX_SENDERS, MAX_BOATS, MAX_SOURCES = 64, 256, 8
 """Senders and boats remembered; senders kept of one boat: where more speak at once nobody can tell whom to believe."""
 GONE_S = 2.0  # a sender silent for so long may begin anew: another start of it, or a lower count, is taken then
 REFEREE_GONE_S = 5.0  # a second referee is listened to once the first has been silent this long
@@ -134,7 +134,7 @@ class FeedReceiver(Closing):
         self._stamps = None if key is None else SigningClock()
         self._lock = threading.Lock()
         self._senders: dict[str, _Sender] = {}
-        self._told: dict[str, dict[str, tuple[Contact, float]]] = {}
+        self._contacts: dict[str, dict[str, tuple[Contact, float]]] = {}
         self._crowded_s: dict[str, float] = {}
         self._rival = ("", -math.inf)
         self._game: GameState | None = None
@@ -154,8 +154,8 @@ class FeedReceiver(Closing):
         """The latest contact of each boat by each sender; of one boat who speaks and was heard first comes first."""
         gone_s, found = self._clock.now_s() - GONE_S, []
         with self._lock:
-            for words in self._told.values():
-                found += sorted(words.values(), key=lambda word: word[1] <= gone_s)
+            for by_sender in self._contacts.values():
+                found += sorted(by_sender.values(), key=lambda entry: entry[1] <= gone_s)
         return tuple(contact for contact, _ in found)
 
     def alarms(self) -> Sequence[Alarm]:
@@ -329,7 +329,7 @@ class FeedReceiver(Closing):
             self._referee = (name, now_s)
 
     def _take_fix(self, fix: Fix, source: str, now_s: float, late_s: float) -> None:
-        has_room = fix.boat in self._told or len(self._told) < MAX_BOATS_TOLD
+        has_room = fix.boat in self._contacts or len(self._contacts) < MAX_BOATS
         if not (has_room if self._boats is None else fix.boat in self._boats):
             return self._refuse("unknown boat", f"{source}: boat {fix.boat} is not of this fleet")
         x_m, y_m = self._frame.to_field_m(fix.latitude_deg, fix.longitude_deg)
@@ -339,14 +339,16 @@ class FeedReceiver(Closing):
         fixed_s = now_s - fix.age_s - late_s
         contact = Contact(fix.boat, (x_m, y_m), heading_rad, fix.speed_mps, fixed_s, fix.error_m, source)
         with self._lock:
-            words = self._told.setdefault(fix.boat, {})
-            if source not in words and len(words) >= MAX_SOURCES:  # it takes the place of who is silent, else came last
-                silent = min(words, key=lambda name: words[name][1])
-                if now_s - words[silent][1] < GONE_S:
+            by_sender = self._contacts.setdefault(fix.boat, {})
+            if (
+                source not in by_sender and len(by_sender) >= MAX_SOURCES
+            ):  # it takes the place of who is silent, else came last
+                silent = min(by_sender, key=lambda name: by_sender[name][1])
+                if now_s - by_sender[silent][1] < GONE_S:
                     self._crowded_s[fix.boat] = now_s
-                    silent = next(reversed(words))
-                del words[silent]
-            words[source] = (contact, now_s)
+                    silent = next(reversed(by_sender))
+                del by_sender[silent]
+            by_sender[source] = (contact, now_s)
         return None
 
     def _refuse(self, kind: str, text: str, times: int = 1) -> None:

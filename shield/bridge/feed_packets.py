@@ -354,7 +354,7 @@ class PositionPublisher:
 
     def __init__(self, sender: FeedSender, frame: FieldFrame, error_m: float) -> None:
         self._sender, self._frame, self._error_m = sender, frame, error_m
-        self._told = False
+        self._logged = False
 
     def take(self, tick: Tick) -> None:
         """Send the fixes of a tick."""
@@ -369,9 +369,9 @@ class PositionPublisher:
         try:
             self._sender.send_positions(fixes)
         except FeedError as error:  # an impossible reading must not stop the others for good
-            if not self._told:
+            if not self._logged:
                 LOG.warning("positions not published: %s", error)
-            self._told = True
+            self._logged = True
 
     def close(self) -> None:
         """Give the socket back."""

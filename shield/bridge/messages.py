@@ -25,7 +25,7 @@ from .fleet_settings import BoatSettings
 
 LOG = logging.getLogger(__name__)
 NEVER_S = math.inf  # age of what was never received
-TELEMETRY = "telemetry"  # source of contacts that a boat's own link told; nobody else may call himself so
+TELEMETRY = "telemetry"  # source of contacts that a boat's own link reported; no other source may use this name
 PILOT, FAILSAFE = "pilot", "failsafe"  # who may have taken a boat: a person, or the autopilot's own fail-safe
 
 
@@ -230,11 +230,13 @@ def contact_of(reading: BoatReading, error_m: float) -> Contact | None:
     )
 
 
-def contacts_heard(sources: Iterable[ContactSource], ears: Mapping[str, Link], error_m: float) -> tuple[Contact, ...]:
-    """What sources tell, and links that are only listened to, whose positions are off by at most ``error_m``."""
-    told = [contact_of(link.read(), error_m) for link in ears.values()]
+def contacts_heard(
+    sources: Iterable[ContactSource], listen_only: Mapping[str, Link], error_m: float
+) -> tuple[Contact, ...]:
+    """Return the contacts of all sources and of listen-only links, whose positions are off by at most ``error_m``."""
+    own = [contact_of(link.read(), error_m) for link in listen_only.values()]
     heard = [contact for source in sources for contact in source.read()]
-    return (*heard, *(contact for contact in told if contact is not None))
+    return (*heard, *(contact for contact in own if contact is not None))
 
 
 @dataclass(frozen=True)
@@ -261,7 +263,7 @@ class Answer:
     fault: str = ""  # what is wrong with the policy now, for a person; empty: nothing
 
 
-class WantedSource(Protocol):
+class NominalSource(Protocol):
     """A policy somewhere else; no call ever waits or raises."""
 
     def offer(self, snapshot: Snapshot) -> None:
@@ -298,7 +300,7 @@ class Tick:
     contacts: tuple[Contact, ...]  # of others, as received
     # what the shield was given; None when no fleet could be built (then all boats are told to stop)
     fleet: Fleet | None
-    wanted: Commands | None  # what the shield was given; rows in the fleet's order
+    nominal: Commands | None  # what the shield was given; rows in the fleet's order
     surroundings: Surroundings | None  # what the shield was given
     decisions: Decisions | None  # the shield's answer, or None
     shield_reset: bool  # whether `Shield.reset` was called before this decision

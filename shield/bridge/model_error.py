@@ -49,7 +49,7 @@ class ModelErrorMonitor:
         self._declared_m = np.array([max(config.position_error_m, error) for error in measured])
         longest = max(self._steps) + self._late + 1
         self._rows: deque[Array] = deque(maxlen=longest)
-        self._told: deque[Array] = deque(maxlen=longest)
+        self._commanded: deque[Array] = deque(maxlen=longest)
         self._errors = np.full((round(MEMORY_S / config.dt_s), len(boats), len(AHEAD_S)), np.nan)
         self._number = 0
         self._read_s = math.inf
@@ -67,8 +67,8 @@ class ModelErrorMonitor:
         left_out = math.ceil(gap_s / self._dt_s - 1.0 - LATE) if math.isfinite(gap_s) else 0
         for _ in range(min(left_out, self._rows.maxlen or 0)):
             self._rows.append(np.full((len(self._boats), L.N_STATE), np.nan))
-            if self._told:
-                self._told.append(self._told[-1])
+            if self._commanded:
+                self._commanded.append(self._commanded[-1])
         now = np.full((len(self._boats), L.N_STATE), np.nan)
         for i, name in enumerate(self._boats):
             row, reading = rows.get(name), readings[name]
@@ -88,22 +88,24 @@ class ModelErrorMonitor:
 
     def sent(self, sent: Mapping[str, Sent]) -> None:
         """Record the commands sent in this turn."""
-        told = np.full((len(self._boats), 2), np.nan)
+        commanded = np.full((len(self._boats), 2), np.nan)
         for i, name in enumerate(self._boats):
             command = sent.get(name)
             if command is not None and command.delivered and math.isfinite(command.heading_rad):
-                told[i] = command.speed_mps, math.degrees(command.heading_rad)
-        self._told.append(told)
+                commanded[i] = command.speed_mps, math.degrees(command.heading_rad)
+        self._commanded.append(commanded)
 
     def _missed_m(self, now: Array, steps: int) -> Array:
         """Return distances from the positions predicted ``steps`` steps ago, m; NaN if unknown."""
-        if len(self._rows) <= steps or len(self._told) < steps + self._late:
+        if len(self._rows) <= steps or len(self._commanded) < steps + self._late:
             return np.full(len(self._boats), np.nan)
         then = self._rows[-1 - steps].copy()
-        told = np.array(list(self._told)[len(self._told) - steps - self._late : len(self._told) - self._late])
+        commanded = np.array(
+            list(self._commanded)[len(self._commanded) - steps - self._late : len(self._commanded) - self._late]
+        )
         known: BoolArray = np.asarray(np.isfinite(then[:, : L.SPEED + 1]).all(axis=1))
-        known = np.asarray(known & np.isfinite(told).all(axis=(0, 2)))
-        roll_out_pending(then, known, self._params, told, self._dt_s)
+        known = np.asarray(known & np.isfinite(commanded).all(axis=(0, 2)))
+        roll_out_pending(then, known, self._params, commanded, self._dt_s)
         missed = np.hypot(then[:, L.X] - now[:, L.X], then[:, L.Y] - now[:, L.Y])
         return np.where(known, missed, np.nan)
 

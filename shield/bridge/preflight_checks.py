@@ -117,9 +117,11 @@ def not_passed(results: Iterable[CheckResult], accepted: Iterable[str] = ()) -> 
     return [r for r in results if not r.passed and r.name not in allowed and r.name.split(":")[0] not in allowed]
 
 
-def check_situation(name: str, fleet: FleetFile, tracker: Tracker, grounds: Surroundings = OPEN_WATER) -> CheckResult:
-    """One of `SITUATION`, of a tracker that has just been updated, with the game's grounds, see `StaticObstacles`."""
-    return CheckResult(name, *SITUATION[name](fleet, tracker, StaticObstacles(fleet, grounds)))
+def check_situation(
+    name: str, fleet: FleetFile, tracker: Tracker, surroundings: Surroundings = OPEN_WATER
+) -> CheckResult:
+    """One of `SITUATION`, of a tracker just updated, with the game's surroundings, see `StaticObstacles`."""
+    return CheckResult(name, *SITUATION[name](fleet, tracker, StaticObstacles(fleet, surroundings)))
 
 
 def check_known(fleet: FleetFile, tracker: Tracker, obstacles: StaticObstacles) -> Found:

@@ -20,7 +20,7 @@ from .fleet_settings import BoatSettings
 from .mavlink.connection import Endpoint, OnBytes
 from .mavlink.signing import Signing, read_key
 from .mavlink.vehicle import MavlinkLink
-from .messages import Closing, Contact, ContactSource, Link, LinkMaker, TickSink, WantedSource, contacts_heard
+from .messages import Closing, Contact, ContactSource, Link, LinkMaker, NominalSource, TickSink, contacts_heard
 from .moos.links import MoosLinks
 
 LOG = logging.getLogger(__name__)
@@ -44,7 +44,7 @@ class VehicleSession(Closing):
 
     Attributes:
         links: to the boats this process commands, by name.
-        ears: links that are only listened to, by name.
+        listen_only: links that are only listened to, by name.
         feed: hears it; None: the file has none.
         key: signing key, 32 bytes; None: nothing is signed.
         left: what each boat was left doing, once closed.
@@ -64,7 +64,7 @@ class VehicleSession(Closing):
         commanded = fleet.commanded(boat)
         self.key = key_of(fleet)
         self.links: dict[str, Link] = {}
-        self.ears: dict[str, Link] = {}
+        self.listen_only: dict[str, Link] = {}
         self.feed: FeedReceiver | None = None
         self.left: tuple[str, ...] = ()
         self._makers: dict[str, LinkMaker] = {}
@@ -76,7 +76,7 @@ class VehicleSession(Closing):
                 if entry in commanded:
                     self.links[entry.name] = self._link(entry)
                 elif entry.link is not None and fleet.contact_of(entry) == "telemetry":
-                    self.ears[entry.name] = self._link(entry)
+                    self.listen_only[entry.name] = self._link(entry)
             listen = fleet.feed_listen(boat)
             if fleet.feed is not None and listen is not None:
                 self.feed = FeedReceiver(listen, fleet.frame, clock, fleet.feed.allow, fleet.names, self.key)
@@ -92,7 +92,7 @@ class VehicleSession(Closing):
         Raises:
             LinkError: a boat does not answer.
         """
-        _all({**self.links, **self.ears}, lambda link: link.connect(timeout_s))
+        _all({**self.links, **self.listen_only}, lambda link: link.connect(timeout_s))
 
     def prepare(self, timeout_s: float = PREPARE_S) -> None:
         """Bring every commanded boat to where it obeys, all at once.
@@ -110,26 +110,26 @@ class VehicleSession(Closing):
 
     def contacts(self) -> tuple[Contact, ...]:
         """Boats heard of by these sources and by links that are only listened to."""
-        return contacts_heard(self.sources(), self.ears, self.fleet.shield_config.position_error_m)
+        return contacts_heard(self.sources(), self.listen_only, self.fleet.shield_config.position_error_m)
 
     def parts(
         self,
-        nominal: WantedSource,
+        nominal: NominalSource,
         sinks: Sequence[TickSink],
-        grounds: Surroundings = OPEN_WATER,
+        surroundings: Surroundings = OPEN_WATER,
         *,
         plays: bool = False,
     ) -> Parts:
         """What a control loop on these boats works with; ``plays``: whether the referee's state of the game counts."""
         game = self.feed if plays else None
-        return Parts(self.links, nominal, self.ears, self.sources(), game, grounds, tuple(sinks))
+        return Parts(self.links, nominal, self.listen_only, self.sources(), game, surroundings, tuple(sinks))
 
     def close(self) -> None:
         """Stop every boat, verify it, and give everything back; may be called again."""
         if not self.left:
             with ThreadPoolExecutor(max(1, len(self.links))) as pool:
                 self.left = tuple(pool.map(_leave, self.links.values()))
-            for link in self.ears.values():
+            for link in self.listen_only.values():
                 link.release()
         for maker in self._makers.values():
             maker.close()

@@ -123,17 +123,17 @@ class StaticObstacles:
 
     Args:
         file: the file; its geofence is the operating area, whatever field the game has.
-        grounds: static constraints of the game: its obstacles, and the own flag's circle as ``stops``.
+        surroundings: static constraints of the game: its obstacles, and the own flag's circle as ``stops``.
     """
 
-    def __init__(self, file: FleetFile, grounds: Surroundings = OPEN_WATER) -> None:
+    def __init__(self, file: FleetFile, surroundings: Surroundings = OPEN_WATER) -> None:
         self._game_max_age_s = file.limits.game.max_age_s
         fixed = file.surroundings
         self._with_referee = replace(
-            grounds,
+            surroundings,
             field=fixed.field,
-            polygons=(*fixed.polygons, *grounds.polygons),
-            circles=(*fixed.circles, *grounds.circles),
+            polygons=(*fixed.polygons, *surroundings.polygons),
+            circles=(*fixed.circles, *surroundings.circles),
         )
         self._without = replace(self._with_referee, stops=())
 

@@ -23,20 +23,20 @@ from .fleet_file import FleetFile
 from .messages import NEVER_S, Alarm, BoatReading, Contact, Sent
 
 LOG = logging.getLogger(__name__)
-TALK_EVERY_S, MOST_TOLD = 5.0, 256
+TALK_EVERY_S, MOST_LOGGED = 5.0, 256
 """Interval between logs of the same fault of a boat, s; faults remembered (a feed may send any number of names)."""
 GHOST = "~"  # a ghost is named after its boat, plus this and a number; no boat name in a fleet file contains it
 FARTHEST_M = 1e5  # positions farther from the field's corner are faults
 SPEED_SHARE, SPEED_MORE_MPS = 2.0, 1.0
 """Speeds beyond this share of the platform's top speed plus this are faults: current and wind add less."""
 JUMP_M = 3.0  # deviation from the expected position that receiver noise does not explain, m
-BELIEVED_AFTER_S = 2.0
+ACCEPTED_AFTER_S = 2.0
 """A new position reported consistently for this long is accepted, s, unless another source sees the boat elsewhere."""
 MOVED_M, FROZEN_M = 0.05, 0.6
 """A position is frozen if it moved less than the first while the speed integrates to more than the second, m."""
 UNDER_WAY_MPS = 0.2  # lower speeds are not integrated: they may be noise of a boat at rest
 EARLY_S = 0.1  # contacts dated farther in the future than this are clock faults
-MOST_SOURCES, MOST_STORIES = 32, 3
+MOST_SOURCES, MOST_GROUPS = 32, 3
 """Sources remembered per boat; positions of it that the shield keeps clear of. With more, its position is unknown."""
 VAGUE_M = 10.0
 """A position with a larger error does not widen that of a more precise one. As a rival it makes `View.crowded` true."""
@@ -91,7 +91,7 @@ class Gate:
             if self._doubted is None or not self._is_near(self._doubted, fix):
                 self._doubted_since_s = fix.fixed_s
             self._doubted = fix
-            if fix.fixed_s - self._doubted_since_s < BELIEVED_AFTER_S:
+            if fix.fixed_s - self._doubted_since_s < ACCEPTED_AFTER_S:
                 return f"position jumped {_apart(last, fix)[0]:.0f} m"
         self._last, self._doubted = fix, None
         return ""
@@ -109,7 +109,7 @@ class Gate:
     def _is_near(self, before: Contact, fix: Contact) -> bool:
         """Whether the boat can have moved from one fix to the other, by any manoeuvre."""
         apart_m, seconds = _apart(before, fix)
-        return apart_m <= JUMP_M + 2.0 * self._fastest * min(seconds, BELIEVED_AFTER_S)
+        return apart_m <= JUMP_M + 2.0 * self._fastest * min(seconds, ACCEPTED_AFTER_S)
 
 
 @dataclass(frozen=True)
@@ -164,24 +164,24 @@ class ContactFusion:
         if not lately:
             return None
         lately.sort(key=lambda source: ages[source] > self._max_age_s)  # sources still heard first
-        stories: list[list[Contact]] = []
+        groups: list[list[Contact]] = []
         for contact in (self._latest[source] for source in lately):
-            agreeing = [story for story in stories if self._agree(story[0], contact)]
-            agreeing[0].append(contact) if agreeing else stories.append([contact])
-        contact, *others = (self._surest(story, now_s) for story in stories)
-        rivals = tuple(other for other in others if other.error_m <= VAGUE_M)[: MOST_STORIES - 1]
+            agreeing = [group for group in groups if self._agree(group[0], contact)]
+            agreeing[0].append(contact) if agreeing else groups.append([contact])
+        contact, *others = (self._surest(group, now_s) for group in groups)
+        rivals = tuple(other for other in others if other.error_m <= VAGUE_M)[: MOST_GROUPS - 1]
         return View(contact, rivals, _contradiction(contact, others), crowded=len(rivals) < len(others))
 
     def _agree(self, one: Contact, other: Contact) -> bool:
         apart_m, between_s = _apart(one, other)
         room_m = JUMP_M + one.error_m + other.error_m
-        return apart_m <= room_m + self._fastest_mps * min(between_s, BELIEVED_AFTER_S)
+        return apart_m <= room_m + self._fastest_mps * min(between_s, ACCEPTED_AFTER_S)
 
-    def _surest(self, story: list[Contact], now_s: float) -> Contact:
+    def _surest(self, group: list[Contact], now_s: float) -> Contact:
         """Return the most precise contact of a group; its error grows to cover contacts its bound excludes."""
-        surest = min(story, key=lambda contact: contact.error_m + self._fastest_mps * (now_s - contact.fixed_s))
+        surest = min(group, key=lambda contact: contact.error_m + self._fastest_mps * (now_s - contact.fixed_s))
         error_m = surest.error_m
-        for other in story:
+        for other in group:
             apart_m, between_s = _apart(surest, other)
             apart_m -= self._fastest_mps * between_s
             is_sure = between_s <= self._max_age_s and other.error_m <= VAGUE_M
@@ -195,9 +195,9 @@ def _contradiction(contact: Contact, others: list[Contact]) -> str:
         return ""
     names = [other.source if len(other.source) <= 20 else f"{other.source[:19]}…" for other in (contact, *others)]
     apart_m = [_apart(contact, other)[0] for other in others]
-    told = [f"{name} {off_m:.0f} m from there" for name, off_m in zip(names[1:], apart_m, strict=True)]
-    more = ", and others elsewhere" if len(told) >= MOST_STORIES else ""
-    named = ", ".join(told[: MOST_STORIES - 1])
+    texts = [f"{name} {off_m:.0f} m from there" for name, off_m in zip(names[1:], apart_m, strict=True)]
+    more = ", and others elsewhere" if len(texts) >= MOST_GROUPS else ""
+    named = ", ".join(texts[: MOST_GROUPS - 1])
     return f"{names[0]} has it at one place, {named}{more}: find out who is wrong and end it"
 
 
@@ -413,7 +413,7 @@ class Tracker:
         self._log(name, text.split()[0], f"fix refused: {text}")
 
     def _log(self, name: str, what: str, text: str) -> None:
-        if len(self._logged_s) > MOST_TOLD:
+        if len(self._logged_s) > MOST_LOGGED:
             self._logged_s.clear()
         if self._now_s - self._logged_s.get((name, what), -math.inf) >= TALK_EVERY_S:
             self._logged_s[name, what] = self._now_s

@@ -163,7 +163,7 @@ class AsyncWriter(Generic[Item]):
         self._store, self._flush_s, self._give_up_s = store, flush_s, give_up_s
         self._queue: queue.Queue[tuple[float, Item] | None] = queue.Queue(capacity)
         self._oldest_s: float | None = None
-        self._told_s = -TALK_EVERY_S
+        self._logged_s = -TALK_EVERY_S
         self._closing = threading.Event()
         self._handed = (0.0, time.monotonic())  # time that counts, and when it was so; one tuple for both threads
         self._progress_s = self._clock()
@@ -250,8 +250,8 @@ class AsyncWriter(Generic[Item]):
             self._store.flush()
         self._progress_s, behind_s = self._clock(), self.behind_s
         self._oldest_s = None
-        if behind_s > LATE_S and time.monotonic() - self._told_s > TALK_EVERY_S:
-            self._told_s = time.monotonic()
+        if behind_s > LATE_S and time.monotonic() - self._logged_s > TALK_EVERY_S:
+            self._logged_s = time.monotonic()
             LOG.warning("the log %s was %.1f s behind: the disk is slow", self.name, behind_s)
 
     def _next(self, wait_s: float) -> tuple[float, Item] | None:

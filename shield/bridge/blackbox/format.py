@@ -19,7 +19,7 @@ from ...platforms import PLATFORMS, Gains, Platform
 from ...platforms import layout as L
 from ...surroundings import Surroundings
 from ..messages import Action, BoatReading, Contact, Sent, Tick
-from .nonfinite import plain, put_back, restored, take_odd
+from .nonfinite import plain, put_back, restored, take_nonfinite
 
 Number = float | UnsetType
 Schema = dict[str, Any]
@@ -55,10 +55,11 @@ class SurroundingsRecord(Record):
 
 
 class BoatRecord(Record):
-    """One boat as the shield saw it, what was wanted of it and what was decided.
+    """One boat as the shield saw it, its nominal command and what was decided.
 
     state: x m, y m, heading deg, speed m/s, thrust %, rudder %, speed error m/s and integral, heading error deg and
-    integral, turn rate deg/s. wanted, sent: speed m/s; heading rad from the y axis, or deg from the boat's own where
+    integral, turn rate deg/s. wanted, sent (the names that logs have had since 0.2.0): nominal and filtered
+    command, speed m/s; heading rad from the y axis, or deg from the boat's own where
     wanted_relative.
     """
 
@@ -81,7 +82,7 @@ class BoatRecord(Record):
     solver: int | UnsetType = UNSET
 
 
-class OddRecord(Record):
+class NonFiniteRecord(Record):
     """A number that is not finite: its place, and nan, inf, -inf or nan:BITS."""
 
     at: str
@@ -110,7 +111,7 @@ class TickRecord(Record):
     sent: list[Sent]
     actions: list[Action]
     game: str
-    odd: list[OddRecord] = []
+    odd: list[NonFiniteRecord] = []
 
 
 COLUMNS: dict[str, tuple[type, str, type, tuple[int, ...]]] = {
@@ -150,12 +151,12 @@ def tick_to_json(tick: Tick, platforms: Mapping[str, Platform]) -> dict[str, Any
         "policy_age_s": float(tick.policy_age_s),
         "shield_reset": tick.shield_reset,
         "has_fleet": fleet is not None,
-        "has_wanted": fleet is not None and tick.wanted is not None,
+        "has_wanted": fleet is not None and tick.nominal is not None,
         "has_decisions": decisions is not None,
-        "wanted_relative": tick.wanted is not None and tick.wanted.relative,
+        "wanted_relative": tick.nominal is not None and tick.nominal.relative,
         "sent_relative": decisions is not None and decisions.filtered.relative,
         "solve_time_s": 0.0 if decisions is None else float(decisions.solve_time_s),
-        "boats": [] if fleet is None else _boats(fleet, tick.wanted, decisions, platforms),
+        "boats": [] if fleet is None else _boats(fleet, tick.nominal, decisions, platforms),
         "surroundings": [] if tick.surroundings is None else [_surroundings(tick.surroundings)],
         "readings": [_floats(reading) for reading in tick.readings.values()],
         "contacts": [_floats(contact) for contact in tick.contacts],
@@ -163,12 +164,12 @@ def tick_to_json(tick: Tick, platforms: Mapping[str, Platform]) -> dict[str, Any
         "actions": [dict(vars(action)) for action in tick.actions],
         "game": json.dumps(dict(tick.game), default=_any) if tick.game else "",
     }
-    message["odd"] = take_odd(message)
+    message["odd"] = take_nonfinite(message)
     return message
 
 
 def _boats(
-    fleet: Fleet, wanted: Commands | None, decisions: Decisions | None, platforms: Mapping[str, Platform]
+    fleet: Fleet, nominal: Commands | None, decisions: Decisions | None, platforms: Mapping[str, Platform]
 ) -> list[dict[str, Any]]:
     columns: dict[str, Any] = {
         "name": fleet.names,
@@ -178,7 +179,7 @@ def _boats(
         columns["why"] = [Reason(int(reason)).name for reason in decisions.reason]
     sent = None if decisions is None else decisions.filtered
     for name, (kind, attribute, _, _) in COLUMNS.items():
-        owner = {Fleet: fleet, Decisions: decisions, Commands: wanted if name == "wanted" else sent}[kind]
+        owner = {Fleet: fleet, Decisions: decisions, Commands: nominal if name == "wanted" else sent}[kind]
         values = getattr(owner, attribute, None)
         if values is not None:
             columns[name] = values.tolist()
@@ -246,17 +247,17 @@ def tick_from_json(message: Any, platforms: Mapping[str, Platform]) -> Tick:
 
 
 def _tick(record: TickRecord, platforms: Mapping[str, Platform]) -> Tick:
-    rows, fleet, decisions, wanted = record.boats, None, None, None
+    rows, fleet, decisions, nominal = record.boats, None, None, None
     around = _surroundings_of(record.surroundings[0]) if record.surroundings else None
     if record.has_fleet:
         names, kinds = tuple(row.name for row in rows), tuple(_platform(row.platform, platforms) for row in rows)
         fleet = Fleet(names=names, platforms=kinds, **_arrays(rows, Fleet))
     if record.has_wanted:
-        wanted = Commands(_array(rows, "wanted"), record.wanted_relative)
-    if record.has_decisions and fleet is not None and wanted is not None:
+        nominal = Commands(_array(rows, "wanted"), record.wanted_relative)
+    if record.has_decisions and fleet is not None and nominal is not None:
         decisions = Decisions(
             fleet=fleet,
-            nominal=wanted,
+            nominal=nominal,
             filtered=Commands(_array(rows, "sent"), record.sent_relative),
             solve_time_s=record.solve_time_s,
             area=None if around is None else around.field,
@@ -270,7 +271,7 @@ def _tick(record: TickRecord, platforms: Mapping[str, Platform]) -> Tick:
         readings={row.boat: dataclasses.replace(row) for row in record.readings},  # with what an old log lacks
         contacts=tuple(record.contacts),
         fleet=fleet,
-        wanted=wanted,
+        nominal=nominal,
         surroundings=around,
         decisions=decisions,
         sent={row.boat: dataclasses.replace(row) for row in record.sent},

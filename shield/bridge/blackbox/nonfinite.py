@@ -70,7 +70,7 @@ def restored(value: Any) -> Any:
     return from_text(value) if is_float else value
 
 
-def take_odd(node: Any, at: str = "") -> list[dict[str, str]]:
+def take_nonfinite(node: Any, at: str = "") -> list[dict[str, str]]:
     """Take numbers that are not finite out of a message, in place; where each was, dots between, and its text."""
     entries = list(node.items()) if isinstance(node, dict) else list(enumerate(node))
     odd = [key for key, value in entries if type(value) is float and not math.isfinite(value)]
@@ -84,12 +84,12 @@ def take_odd(node: Any, at: str = "") -> list[dict[str, str]]:
         node.clear()
     for key, value in entries:
         if type(value) is dict or type(value) is list:
-            found += take_odd(value, f"{at}{key}.")
+            found += take_nonfinite(value, f"{at}{key}.")
     return found
 
 
 def put_back(message: Any, entries: Any) -> None:
-    """Put numbers that `take_odd` listed back where they were, in place.
+    """Put numbers that `take_nonfinite` listed back where they were, in place.
 
     Raises:
         LogError: an entry is none, or its place is not there.

@@ -233,12 +233,12 @@ def _snapshot(tick: Tick) -> Tick:
     """The tick with its own copies of arrays that the loop may use again."""
     if tick.fleet is None:
         return tick
-    fleet, wanted, decisions = _copied(tick.fleet), tick.wanted, tick.decisions
-    wanted = None if wanted is None else _copied(wanted)
-    if decisions is not None and wanted is not None:
-        sent = wanted if decisions.filtered is tick.wanted else _copied(decisions.filtered)
-        decisions = replace(_copied(decisions), fleet=fleet, nominal=wanted, filtered=sent)
-    return replace(tick, fleet=fleet, wanted=wanted, decisions=None if wanted is None else decisions)
+    fleet, nominal, decisions = _copied(tick.fleet), tick.nominal, tick.decisions
+    nominal = None if nominal is None else _copied(nominal)
+    if decisions is not None and nominal is not None:
+        sent = nominal if decisions.filtered is tick.nominal else _copied(decisions.filtered)
+        decisions = replace(_copied(decisions), fleet=fleet, nominal=nominal, filtered=sent)
+    return replace(tick, fleet=fleet, nominal=nominal, decisions=None if nominal is None else decisions)
 
 
 def _copied(entry: Any) -> Any:

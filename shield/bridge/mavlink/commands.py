@@ -138,15 +138,15 @@ def choose_route(boat: str, route: str, abilities: Abilities) -> Route:
         raise LinkRefused(f"boat {boat}: firmware {'.'.join(map(str, version))} is too old; install ArduPilot Rover 4")
     if top is not None and not 0.0 < top < math.inf:
         raise LinkRefused(f"boat {boat}: parameter WP_SPEED is {top:g}, so it would not move; set it to its top speed")
-    wanted = ROUTES if route == "auto" else (route,)
-    can = [name for name in wanted if abilities.capabilities & CAPABILITIES[name]]
+    asked = ROUTES if route == "auto" else (route,)
+    can = [name for name in asked if abilities.capabilities & CAPABILITIES[name]]
     for name in can:
         if name == VelocityRoute.name:
             return VelocityRoute(top)
         if top is not None:
             return AttitudeRoute(top)
-    why = f"it cannot do {' or '.join(name for name in wanted if name not in can)}"
-    why = "its WP_SPEED cannot be read" if len(can) == len(wanted) else why
+    why = f"it cannot do {' or '.join(name for name in asked if name not in can)}"
+    why = "its WP_SPEED cannot be read" if len(can) == len(asked) else why
     why = why if abilities.capabilities else "it did not answer what it can do"
     raise LinkRefused(
         f"boat {boat}: no way to command heading and speed ({why}); give route auto, or install ArduPilot Rover 4 with "
@@ -171,7 +171,7 @@ class Patience:
     Args:
         clock: the loop's.
         timeout_s: s.
-        is_off: true once what is waited for is not wanted any more.
+        is_off: true once what is waited for is no longer needed.
     """
 
     def __init__(self, clock: Clock, timeout_s: float, is_off: Callable[[], bool] = never) -> None:

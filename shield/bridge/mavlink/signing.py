@@ -151,8 +151,8 @@ class SignatureCheck:
         """
         if frame[0] != _MARKER_2 or not frame[2] & _SIGNED_FLAG:
             return "unsigned"
-        wanted = hashlib.sha256(self._key + frame[:-6]).digest()[:6]
-        if not hmac.compare_digest(wanted, frame[-6:]):
+        expected = hashlib.sha256(self._key + frame[:-6]).digest()[:6]
+        if not hmac.compare_digest(expected, frame[-6:]):
             return "bad_signature"
         stream, ticks = (frame[-_BLOCK], frame[5], frame[6]), int.from_bytes(frame[-12:-6], "little")
         latest = self._latest.get(stream)

@@ -222,8 +222,8 @@ class Streams:
             int(mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT): 2.0,
             int(mavlink.MAVLINK_MSG_ID_SYSTEM_TIME): 1.0,
         }
-        self._wanted_hz = {**self.needed, **self._extra}
-        self._arrivals: dict[int, deque[float]] = {key: deque(maxlen=_KEPT) for key in self._wanted_hz}
+        self._asked_hz = {**self.needed, **self._extra}
+        self._arrivals: dict[int, deque[float]] = {key: deque(maxlen=_KEPT) for key in self._asked_hz}
         self._asked_s: dict[int, float] = {}
         self._tries: dict[int, int] = dict.fromkeys(self._extra, 0)
 
@@ -234,7 +234,7 @@ class Streams:
 
     def rate_hz(self, message_id: int, now_s: float) -> float:
         """How often a message came lately, Hz."""
-        window_s = max(WINDOW_S, WINDOW_MESSAGES / self._wanted_hz[message_id])
+        window_s = max(WINDOW_S, WINDOW_MESSAGES / self._asked_hz[message_id])
         return sum(1 for at in self._arrivals[message_id] if 0.0 <= now_s - at < window_s) / window_s
 
     def rates_hz(self, now_s: float) -> dict[str, float]:
@@ -253,7 +253,7 @@ class Streams:
     def requests(self, now_s: float) -> list[tuple[int, float]]:
         """Messages to ask for now and their intervals, us: those that do not arrive as they should."""
         due = []
-        for key, hz in self._wanted_hz.items():
+        for key, hz in self._asked_hz.items():
             arrivals, asked_s = self._arrivals[key], self._asked_s.get(key)
             is_gone = bool(arrivals) and now_s - arrivals[-1] > _GONE_S
             if key in self._extra and self._tries[key] >= _EXTRA_TRIES and not is_gone:

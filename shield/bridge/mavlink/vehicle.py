@@ -96,7 +96,7 @@ class MavlinkLink(Link):
     ) -> None:
         self.boat, self.endpoint, self.system_id = boat, endpoint, system_id
         self.autopilot = Autopilot(boat, endpoint, system_id, frame, clock, rate_hz)
-        self._wanted_route = check_route(route)
+        self._chosen_route = check_route(route)
         self._frame, self._clock = frame, clock
         self._attached, self._last_rad, self._started_s = False, math.nan, clock.now_s()
 
@@ -137,13 +137,13 @@ class MavlinkLink(Link):
         if boat.heartbeat is None:
             raise LinkError(f"boat {self.boat}: not connected; call connect first")
         dialogue.learn(TOP_SPEED, ASKED, patience.part(_LEARN_S))
-        boat.route = choose_route(self.boat, self._wanted_route, dialogue.abilities)
+        boat.route = choose_route(self.boat, self._chosen_route, dialogue.abilities)
         self._reach(mode_request(boat.target, GUIDED), lambda: boat.mode == GUIDED, "GUIDED", patience)
         arm = command(boat.target, mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1)  # all checks on
         self._reach(arm, lambda: boat.is_armed, "arming", patience)
         with dialogue.changed:  # ours from now on, unless a pilot took it since, or nobody wants it any more
             taken = boat.released, boat.released_by
-            self._check_wanted(patience)
+            self._check_still_taken(patience)
             if boat.mode != GUIDED or not boat.is_armed:
                 state = "armed" if boat.is_armed else "disarmed"
                 raise LinkError(f"boat {self.boat}: {state} in {boat.mode} again; see who else commands it")
@@ -267,7 +267,7 @@ class MavlinkLink(Link):
                 break
         else:
             return
-        self._check_wanted(patience)
+        self._check_still_taken(patience)
         if result is None:
             raise LinkError(f"boat {self.boat}: no answer to the request for {what}; check the radio, then start again")
         if result == mavlink.MAV_RESULT_ACCEPTED:
@@ -279,7 +279,7 @@ class MavlinkLink(Link):
             f"boat {self.boat} refuses {what} ({why}): {dialogue.said()}; put that right, then start again"
         )
 
-    def _check_wanted(self, patience: Patience) -> None:
+    def _check_still_taken(self, patience: Patience) -> None:
         if patience.is_off():
             raise LinkError(f"boat {self.boat}: taking it was called off; it is left alone")
 

@@ -223,10 +223,10 @@ def _pid_faults(mission: Mission, name: str, platform: Platform) -> Iterator[str
     for key in ("tardy_helm_threshold", "tardy_nav_threshold"):
         if not SHORTEST_S <= number(mission, name, key, LONGEST_S) <= LONGEST_S:
             yield f"{name} has {key} {mission[name][key]}: set it to {LONGEST_S:g}"
-    for key, wanted in _gains(platform).items():
-        value = number(mission, name, key, wanted)
-        if abs(value - wanted) > GAIN_OFF * max(abs(wanted), 1e-6):
-            yield f"{name} has {key} {value:g} and platform {platform.name} {wanted:g}: fit the platform, or set it"
+    for key, needed in _gains(platform).items():
+        value = number(mission, name, key, needed)
+        if abs(value - needed) > GAIN_OFF * max(abs(needed), 1e-6):
+            yield f"{name} has {key} {value:g} and platform {platform.name} {needed:g}: fit the platform, or set it"
 
 
 def _gains(platform: Platform) -> dict[str, float]:

@@ -83,8 +83,8 @@ class Drivers:
             return self._hear_override(message)
         if message.key == ALLSTOP:
             self.helm, before, self.allstop = message.source, self.allstop.lower(), message.text
-            told = self.allstop.lower() != "clear" or before not in ("", "clear")
-            return f"the helm says all-stop: {self.allstop}" if told else ""
+            is_stop = self.allstop.lower() != "clear" or before not in ("", "clear")
+            return f"the helm says all-stop: {self.allstop}" if is_stop else ""
         if message.key == STATE:
             self.helm, self.state = message.source, message.text
         elif message.key in self._outputs and (live or message.data != DOUBLE):

@@ -58,11 +58,11 @@ class Gate:
             self._heard[message.key] = message.value, now_s
 
     def forget(self) -> None:
-        """The connection was lost: nothing is wanted any more."""
+        """The connection was lost: there is no nominal command any more."""
         self._heard.clear()
 
     def nominal(self, reading: BoatReading) -> Nominal:
-        """What is wanted of the boat now; a stop on its present heading when nobody says."""
+        """The boat's nominal command now; a stop on its present heading when nobody says."""
         fault = ""
         for name in self.inputs:
             if name not in self._heard:
@@ -126,7 +126,7 @@ class PidGate(Gate):
         self._meant: tuple[Nominal, tuple[float, float]] | None = None
 
     def forget(self) -> None:
-        """The connection was lost: nothing is wanted, and the autopilot remembers nothing."""
+        """The connection was lost: there is no nominal command, and the autopilot remembers nothing."""
         super().forget()
         self.autopilot.forget()
         self._meant = None
@@ -186,10 +186,14 @@ class Autopilot:
         """Begin anew."""
         self.row: Array = fresh_state(0.0, 0.0, 0.0)
 
-    def step(self, wanted_deg: float, wanted_mps: float, heading_deg: float, speed_mps: float) -> tuple[float, float]:
-        """Rudder and thrust, percent, for a heading and a speed wanted; the boat's own count where known."""
+    def step(
+        self, commanded_deg: float, commanded_mps: float, heading_deg: float, speed_mps: float
+    ) -> tuple[float, float]:
+        """Rudder and thrust, percent, for a commanded heading and speed; the boat's own count where known."""
         row = self.row
         if math.isfinite(heading_deg) and math.isfinite(speed_mps):
             row[L.HEADING], row[L.SPEED] = (heading_deg + 180.0) % 360.0 - 180.0, abs(speed_mps)
-        step_boat(self._params, row, wanted_mps, (wanted_deg - row[L.HEADING] + 180.0) % 360.0 - 180.0, self._dt_s)
+        step_boat(
+            self._params, row, commanded_mps, (commanded_deg - row[L.HEADING] + 180.0) % 360.0 - 180.0, self._dt_s
+        )
         return float(row[L.RUDDER]), float(row[L.THRUST])

@@ -13,7 +13,7 @@ from ..clock import Clock
 from ..fleet_checks import MOOS, address_of
 from ..fleet_file import FleetFile
 from ..fleet_settings import BoatSettings, MoosLinkSettings
-from ..messages import Answer, Link, LinkMaker, WantedSource
+from ..messages import Answer, Link, LinkMaker, NominalSource
 from .contacts import MoosContacts
 from .gates import HelmGate, PidGate
 from .vehicle import MoosLink
@@ -50,7 +50,7 @@ class MoosLinks(LinkMaker):
         return tuple(self.contacts.values())
 
 
-class MoosNominal(WantedSource):
+class MoosNominal(NominalSource):
     """A policy that is somebody else's: what the own community of each boat we command wants, through its gate.
 
     Raises:
@@ -71,7 +71,7 @@ class MoosNominal(WantedSource):
         self._links = {name: link for name, link in links.items() if isinstance(link, MoosLink)}
 
     def latest(self) -> Answer:
-        """What is wanted now; a boat nobody commands is told to stop, which its link says in words."""
+        """The nominal commands now; a boat nobody commands is told to stop, which its link says in words."""
         values = np.full((len(self._names), 2), math.nan)
         for name, link in self._links.items():
             nominal = link.nominal()

@@ -78,7 +78,7 @@ class MoosLink(Link):
         self._drivers = Drivers(client_name(boat), gate.outputs, prefix)
         self._faults: Counter[str] = Counter()
         self._texts: deque[str] = deque(maxlen=MOST_TEXTS)
-        self._told_fault = ""
+        self._logged_fault = ""
         self._said_s: dict[str, float] = {}
         self._last_rad, self._sent_s = 0.0, math.inf
         self._prepared = self._closed = False
@@ -153,10 +153,10 @@ class MoosLink(Link):
             allstop = self._drivers.allstop
             if allstop.lower() not in ("", "clear") and not nominal.fault:
                 nominal = Nominal(0.0, nominal.heading_rad, f"the helm stopped all: {allstop}")
-            if nominal.fault != self._told_fault:
+            if nominal.fault != self._logged_fault:
                 words = f"{nominal.fault}; told to stop" if nominal.fault else "nominal commands come again"
                 self._texts.append(f"{self.boat}: {words}")
-                self._told_fault = nominal.fault
+                self._logged_fault = nominal.fault
             return nominal
 
     def send(self, heading_rad: float, speed_mps: float) -> Sent:

@@ -120,7 +120,7 @@ def test_what_is_wrong_is_said(stream):
     assert "1 response in effect" in lines[1]
     assert any(action.text in line for line in lines)
     unready = BoatReading("blue_2", 5.0, mode="MANUAL", why_not="mode is MANUAL; switch it to GUIDED")
-    nothing = {"fleet": None, "decisions": None, "wanted": None, "sent": {}, "contacts": ()}
+    nothing = {"fleet": None, "decisions": None, "nominal": None, "sent": {}, "contacts": ()}
     lost = dataclasses.replace(tick, readings={**tick.readings, "blue_2": unready}, **nothing)
     lines = shown(stream.fleet, Moment(lost, 5.0), columns=110)
     assert "No boat's state is known" in lines[1]

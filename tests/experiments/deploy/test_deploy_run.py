@@ -315,10 +315,10 @@ def test_a_new_fit_under_the_same_name_asks_for_a_new_drill(fleet_file):
 
 def test_without_a_drill_a_step_of_delay_is_assumed_and_a_declared_one_is_kept(fleet_file):
     assert read_fleet(orders_of(fleet_file))[0].shield_config.delay_s == pytest.approx(0.1)
-    assert read_fleet(orders_of(fleet_file, untold_delay_s=0.0))[0].shield_config.delay_s == 0.0, "a demonstration"
+    assert read_fleet(orders_of(fleet_file, unknown_delay_s=0.0))[0].shield_config.delay_s == 0.0, "a demonstration"
     fleet_file.write_text(fleet_file.read_text() + "\nshield: {delay_s: 0.4}\n")
     assert read_fleet(orders_of(fleet_file))[0].shield_config.delay_s == 0.4
-    assert read_fleet(orders_of(fleet_file, untold_delay_s=0.0))[0].shield_config.delay_s == 0.4
+    assert read_fleet(orders_of(fleet_file, unknown_delay_s=0.0))[0].shield_config.delay_s == 0.4
 
 
 def test_a_file_with_nothing_to_command_says_why(fleet_file):

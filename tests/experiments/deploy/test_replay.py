@@ -198,14 +198,15 @@ def test_resets_are_needed_and_after_missing_ticks_nothing_is_proved_until_the_n
 def test_a_change_of_the_fleet_makes_the_shield_forget_as_well(ticks):
     def without_last(tick):
         parts = {name: getattr(tick.fleet, name)[:3] for name in ("state", "team", "platforms", "controlled", "names")}
-        wanted = Commands(tick.wanted.values[:3], tick.wanted.relative)
-        return dataclasses.replace(tick, fleet=Fleet(**parts), wanted=wanted)
+        wanted = Commands(tick.nominal.values[:3], tick.nominal.relative)
+        return dataclasses.replace(tick, fleet=Fleet(**parts), nominal=wanted)
 
     assert prove(HEADER, lied(ticks, 90)[70:]).different == 0
     shield = Shield(HEADER.config, HEADER.surroundings)
     three = [without_last(tick) if tick.number < 80 else tick for tick in ticks[70:]]
     decided = [
-        dataclasses.replace(tick, decisions=shield.decide(tick.fleet, tick.wanted, tick.surroundings)) for tick in three
+        dataclasses.replace(tick, decisions=shield.decide(tick.fleet, tick.nominal, tick.surroundings))
+        for tick in three
     ]
     assert prove(HEADER, decided).same == len(decided)
     assert prove(HEADER, lied(decided, 20)).different == 1

@@ -6,7 +6,7 @@ import types
 import numpy as np
 import pytest
 from steerclear.experiments.deploy.sea_trial import MANOEUVRES, SeaTrial, longest_s
-from steerclear.experiments.fit.runs import NEEDED, Streams, untold
+from steerclear.experiments.fit.runs import NEEDED, Streams, silent
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.bridge.messages import Snapshot
 from steerclear.shield.bridge.operator import Operator
@@ -62,7 +62,7 @@ def test_the_trial_shows_turns_and_stops_of_both_sides():
     assert turn.max() > 30.0
     assert turn.min() < -30.0
     assert rows[:, 4].max() > 2.8
-    log = Streams("trial", untold)
+    log = Streams("trial", silent)
     for time_s, *values in rows:
         for what, value in zip(NEEDED, values, strict=True):
             log.add(what, time_s, value)

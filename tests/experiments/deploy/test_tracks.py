@@ -67,7 +67,7 @@ def test_a_boat_nothing_was_heard_of_is_not_there(run):
 
 def _alone(tick):
     parts = {name: getattr(tick.fleet, name)[:3] for name in ("state", "team", "platforms", "controlled", "names")}
-    return dataclasses.replace(tick, fleet=dataclasses.replace(tick.fleet, **parts), decisions=None, wanted=None)
+    return dataclasses.replace(tick, fleet=dataclasses.replace(tick.fleet, **parts), decisions=None, nominal=None)
 
 
 def test_ticks_that_come_unevenly_make_an_even_track(run):

@@ -27,7 +27,7 @@ def test_a_log_of_any_kind_gives_the_runs_that_were_driven(ending, tmp_path):
         shift = seen[0, :2] - driven[0, 1:3]  # places from the log's own origin
         assert np.abs(seen[:, :2] - shift - driven[:, 1:3]).max() < 0.3
         assert np.abs((seen[:, 2] - driven[:, 3] + 180.0) % 360.0 - 180.0).max() < 12.0  # a row early or late
-        assert np.abs(run.told[k, 0] - driven[:, 5]).mean() < 0.06
+        assert np.abs(run.commanded[k, 0] - driven[:, 5]).mean() < 0.06
 
 
 def test_of_a_log_with_several_boats_one_is_named(tmp_path):
@@ -95,7 +95,7 @@ def read(path, rows, write, **more):
     """Runs of a log of those rows, and what was told to be left out."""
     said = []
     write(path, rows, **more)
-    return read_logs([path], tell=said.append), said
+    return read_logs([path], notice=said.append), said
 
 
 def test_positions_before_a_fix_are_left_out(tmp_path):
@@ -112,7 +112,7 @@ def test_another_component_and_commands_to_another_boat_do_not_move_it(tmp_path)
     mixed, said = read(tmp_path / "b.tlog", rows, as_tlog, component=191)
     assert not said
     assert np.allclose(plain[0].seen, mixed[0].seen)
-    assert np.allclose(plain[0].told, mixed[0].told)
+    assert np.allclose(plain[0].commanded, mixed[0].commanded)
 
 
 @pytest.mark.parametrize("receivers", [(True, False), (False, True)])
@@ -124,7 +124,7 @@ def test_speeds_are_those_of_a_receiver_with_a_fix(receivers, tmp_path):
 
 def test_a_share_of_top_speed_is_of_the_parameter_that_held_then(tmp_path):
     runs, _ = read(tmp_path / "a.tlog", long_drive(), as_tlog, top=lambda t: 2.0 if t < 50.0 else 4.0)
-    assert max(run.told[:, 0].max() for run in runs) == pytest.approx(2.0, abs=1e-3)
+    assert max(run.commanded[:, 0].max() for run in runs) == pytest.approx(2.0, abs=1e-3)
 
 
 def test_where_the_first_parameter_is_zero_the_cruise_speed_counts(tmp_path):
@@ -138,14 +138,14 @@ def test_where_the_first_parameter_is_zero_the_cruise_speed_counts(tmp_path):
     assert body[8 : 8 + 10] == none[:10].replace(none[4:5], body[12:13], 1)  # the parameter is what comes first
     path.write_bytes(head + bytes(none) + head + bytes(cruise) + body[first:])
     runs = read_logs([path])
-    assert max(run.told[:, 0].max() for run in runs) == pytest.approx(2.0, abs=1e-3)
+    assert max(run.commanded[:, 0].max() for run in runs) == pytest.approx(2.0, abs=1e-3)
 
 
 @pytest.mark.parametrize("every", [1, 5, 9])
 def test_commands_keep_their_own_times_whatever_the_rate_of_positions(every, tmp_path):
     rows = long_drive()
     runs, _ = read(tmp_path / "a.tlog", rows, as_tlog, every=every)
-    held = {run.begin_s % 1.7e9: run.told for run in runs}
+    held = {run.begin_s % 1.7e9: run.commanded for run in runs}
 
     def told_at(row):
         found = [told[k] for s, told in held.items() if 0 <= (k := round((row[0] - s) / 0.1)) < len(told)]
@@ -160,7 +160,7 @@ def test_commands_keep_their_own_times_whatever_the_rate_of_positions(every, tmp
 
 
 def test_rows_too_seldom_to_tell_a_delay_are_refused(tmp_path):
-    with pytest.raises(FitError, match=r"come every 0.5 s, from which no delay can be told; log them at least every"):
+    with pytest.raises(FitError, match=r"come every 0.5 s, from which no delay can be found; log them at least every"):
         read(tmp_path / "a.csv", long_drive()[::5], as_csv)
     with pytest.raises(FitError, match=r"positions come every 1.5 s"):
         read(tmp_path / "a.tlog", long_drive(), as_tlog, every=15)
@@ -239,8 +239,8 @@ def test_a_heading_that_is_not_known_is_no_heading(tmp_path):
 @pytest.mark.parametrize(
     ("legs", "words"),
     [
-        ([(2.0, 0.0), (2.0, 90.0), (2.0, 30.0)], "never seen told to stop and slow down: .*way to stop is not known"),
-        ([(2.0, 0.0), (1.5, 90.0), (2.0, 30.0)], "never seen told to stop and slow down"),
+        ([(2.0, 0.0), (2.0, 90.0), (2.0, 30.0)], "never seen commanded to stop and slow down: .*way to stop is not known"),
+        ([(2.0, 0.0), (1.5, 90.0), (2.0, 30.0)], "never seen commanded to stop and slow down"),
     ],
 )
 def test_a_boat_whose_stop_was_never_seen_is_refused(legs, words, tmp_path):
@@ -250,7 +250,7 @@ def test_a_boat_whose_stop_was_never_seen_is_refused(legs, words, tmp_path):
 
 def test_a_boat_that_was_never_seen_to_start_is_refused(tmp_path):
     rows = long_drive(legs=[(2.0, 0.0), (2.0, 90.0), *[(0.0, 90.0)] * 15])
-    with pytest.raises(FitError, match="never seen told to go and gain speed"):
+    with pytest.raises(FitError, match="never seen commanded to go and gain speed"):
         read(tmp_path / "a.csv", rows[40:], as_csv)
 
 

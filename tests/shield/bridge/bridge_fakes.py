@@ -240,7 +240,7 @@ class World:
     """Own boats and others, one loop, one clock."""
 
     def __init__(
-        self, fleet, starts, rule, others=(), shield=None, game=None, grounds=OPEN_WATER, contacts=FakeContacts
+        self, fleet, starts, rule, others=(), shield=None, game=None, surroundings=OPEN_WATER, contacts=FakeContacts
     ):
         self.fleet = fleet
         self.clock = ManualClock(1000.0)
@@ -256,7 +256,7 @@ class World:
         self.sink = FakeSink()
         self.operator = Operator()
         parts = Parts(
-            self.links, self.policy, contacts=(self.contacts,), game=game, grounds=grounds, sinks=(self.sink,)
+            self.links, self.policy, contacts=(self.contacts,), game=game, surroundings=surroundings, sinks=(self.sink,)
         )
         self.loop = ControlLoop(fleet, parts, self.operator, self.clock, shield)
         self.closest_m = math.inf

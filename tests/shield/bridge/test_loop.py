@@ -270,7 +270,7 @@ def test_a_boat_that_is_beyond_its_hard_line_once_a_command_works_is_handed_over
 
 def test_a_boat_that_can_only_stop_before_a_shore_is_stopped_by_its_link_and_goes_on_by_itself():
     shore = Surroundings(polygons=[((-30.0, 20.0), (110.0, 20.0), (110.0, 30.0), (-30.0, 30.0))])
-    world = lined((40.0, 5.0, 0.0, 2.0), grounds=shore).run(25.0)
+    world = lined((40.0, 5.0, 0.0, 2.0), surroundings=shore).run(25.0)
     assert world.links["blue_1"].row[1] < 20.0
     assert not world.loop.failsafe.handed_over
 

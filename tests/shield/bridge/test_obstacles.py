@@ -156,7 +156,7 @@ def test_a_boat_told_to_cross_its_own_flag_stays_out_of_the_circle_whether_the_f
     """It may come home at any time. Without a referee the boat goes through; the tick holds what it was given."""
 
     def nearest_m(game, seconds):
-        world = World(fleet_of(blue=1, red=0), [(10.0, -5.0, 0.0, 2.0)], straight(0.0), game=game, grounds=GROUNDS)
+        world = World(fleet_of(blue=1, red=0), [(10.0, -5.0, 0.0, 2.0)], straight(0.0), game=game, surroundings=GROUNDS)
         path = []
         world.run(seconds, lambda world: path.append(world.links["blue_1"].row[:2] - CIRCLE[:2]))
         return world, float(np.hypot(*np.array(path).T).min())
@@ -170,7 +170,9 @@ def test_a_boat_told_to_cross_its_own_flag_stays_out_of_the_circle_whether_the_f
 
 def test_a_referee_who_falls_silent_lifts_the_circle_and_the_next_word_sets_it_again():
     game = FakeGame(lambda number: game_of())
-    world = World(fleet_of(blue=1, red=0), [(40.0, 30.0, 0.0, 0.0)], straight(0.0, 0.0), game=game, grounds=GROUNDS)
+    world = World(
+        fleet_of(blue=1, red=0), [(40.0, 30.0, 0.0, 0.0)], straight(0.0, 0.0), game=game, surroundings=GROUNDS
+    )
     seen = []
     for age_s in (0.0, 3.0, 0.1):
         game.age_s = age_s

@@ -10,7 +10,7 @@ from steerclear.shield.bridge.failsafe import Failsafe, Seen
 from steerclear.shield.bridge.fleet_settings import ContactLimit
 from steerclear.shield.bridge.messages import Answer, BoatReading, Contact
 from steerclear.shield.bridge.operator import Override
-from steerclear.shield.bridge.tracker import MOST_STORIES, ContactFusion, Tracker
+from steerclear.shield.bridge.tracker import MOST_GROUPS, ContactFusion, Tracker
 from steerclear.shield.platforms import layout as L
 
 LIMIT = ContactLimit()
@@ -164,8 +164,8 @@ def test_when_the_first_falls_silent_who_speaks_counts_and_the_first_is_still_ke
 
 @pytest.mark.parametrize("more", [0, 1])
 def test_more_stories_than_can_be_kept_clear_of_are_too_many(more):
-    view = fused(*(contact(f"s{k}", 30.0 * k) for k in range(MOST_STORIES + more))).view(100.0)
-    assert (view.crowded, len(view.rivals)) == (bool(more), MOST_STORIES - 1)
+    view = fused(*(contact(f"s{k}", 30.0 * k) for k in range(MOST_GROUPS + more))).view(100.0)
+    assert (view.crowded, len(view.rivals)) == (bool(more), MOST_GROUPS - 1)
     assert ("others elsewhere" in view.text) == bool(more)
 
 
@@ -202,8 +202,8 @@ def test_a_contradiction_slows_boats_at_once_and_too_many_stories_are_as_a_lost_
     verdict, response, text = judged(tracker_with(contact(), contact("evil", 40.0)), "red_1")
     assert (response, verdict.responses["blue_1"]) == ("slow", "slow")
     assert "hub has it at one place, evil 30 m from there" in text
-    stories = (contact(f"s{k}", 30.0 * k) for k in range(MOST_STORIES + 1))
-    assert judged(tracker_with(*stories), "red_1")[1] == "stop"
+    groups = (contact(f"s{k}", 30.0 * k) for k in range(MOST_GROUPS + 1))
+    assert judged(tracker_with(*groups), "red_1")[1] == "stop"
 
 
 def test_the_operator_may_switch_the_response_off_and_ghosts_stay():

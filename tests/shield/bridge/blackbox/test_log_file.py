@@ -133,12 +133,12 @@ def test_arrays_may_be_used_again_after_take(tmp_path):
     kept = tick.fleet.state.copy()
     writer = McapWriter(tmp_path / "run.mcap", header_of())
     writer.take(tick)
-    for array in (tick.fleet.state, tick.wanted.values, tick.decisions.safety_margin_m):
+    for array in (tick.fleet.state, tick.nominal.values, tick.decisions.safety_margin_m):
         array[:] = 7.0
     writer.close()
     ((back,), _) = read(tmp_path / "run.mcap")
     assert back.fleet.state.tobytes() == kept.tobytes()
-    assert not (back.wanted.values == 7.0).any()
+    assert not (back.nominal.values == 7.0).any()
     assert not (back.decisions.safety_margin_m == 7.0).any()
 
 

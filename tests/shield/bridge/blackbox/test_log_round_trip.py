@@ -118,7 +118,7 @@ def ticks(draw):
         readings={"blue_1": BoatReading("blue_1", draw(floats), place, **said)},
         contacts=(Contact("red_1", (draw(floats), 0.0), draw(floats), 1.0, 2.0, 0.3, draw(words)),),
         fleet=fleet,
-        wanted=wanted,
+        nominal=wanted,
         surroundings=around,
         decisions=None if decisions is None else dataclasses.replace(decisions, area=around and around.field),
         shield_reset=draw(st.booleans()),
@@ -142,7 +142,7 @@ def odd_tick(number, tick):
     state = tick.fleet.state.copy()
     state[2:, 4:] = math.nan
     fleet = dataclasses.replace(tick.fleet, state=state, age_s=np.array([0.0, math.inf, math.nan, 0.1]))
-    wanted = dataclasses.replace(tick.wanted, values=np.full((4, 2), math.nan))
+    wanted = dataclasses.replace(tick.nominal, values=np.full((4, 2), math.nan))
     margins = np.array([math.inf, -math.inf, math.nan, 1.0])
     odd = {"fleet": fleet, "nominal": wanted, "safety_margin_m": margins, "solve_time_s": math.nan}
     decisions = dataclasses.replace(tick.decisions, **odd)
@@ -150,9 +150,9 @@ def odd_tick(number, tick):
     readings = {"blue_1": dataclasses.replace(tick.readings["blue_1"], **odd)}
     odd = {"heading_rad": math.nan, "speed_mps": math.nan, "delivered": False}
     sent = {"blue_1": dataclasses.replace(tick.sent["blue_1"], **odd)}
-    parts = {"fleet": fleet, "wanted": wanted, "decisions": decisions, "readings": readings, "sent": sent}
+    parts = {"fleet": fleet, "nominal": wanted, "decisions": decisions, "readings": readings, "sent": sent}
     odd = dataclasses.replace(tick, **parts, policy_age_s=math.inf)
-    bare = dataclasses.replace(tick, fleet=None, wanted=None, decisions=None, readings={}, contacts=(), sent={})
+    bare = dataclasses.replace(tick, fleet=None, nominal=None, decisions=None, readings={}, contacts=(), sent={})
     return (odd, bare, tick)[number % 3]
 
 

@@ -197,7 +197,7 @@ def drill_commander_killed(speed=1.0):
     with Scene(speed, killable=True) as scene:
         began = scene.now_s
         os.kill(scene.commander.pid, signal.SIGKILL)
-        stop = scene.response(began, lambda tick: tick.wanted is not None and tick.wanted.values[0, 0] == 0.0)
+        stop = scene.response(began, lambda tick: tick.nominal is not None and tick.nominal.values[0, 0] == 0.0)
         told = scene.response(began, lambda tick: any("silent" in text for text in tick.readings["blue_1"].texts))
         return {"stop wanted after": stop, "told after": told}
 
