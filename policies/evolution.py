@@ -46,7 +46,7 @@ KEEP_OFF_M = 5.0
 """In live games a boat nearer than this to another one ahead of its beam turns away from it."""
 
 
-class Desk(NamedTuple):
+class Scratch(NamedTuple):
     """Work space of a search: a game to play plans in, and the recorded rollout of the best plan.
 
     A plan has H macro-actions, each held for ``repeats`` decisions. A rollout has D decisions and S steps of motion.
@@ -69,7 +69,7 @@ class Desk(NamedTuple):
     brood: IntArray  # (P, H) plans of a generation
 
 
-def make_desk(config: GameConfig, population: int, generations: int, horizon: int, move_s: float) -> Desk:
+def make_scratch(config: GameConfig, population: int, generations: int, horizon: int, move_s: float) -> Scratch:
     """Return the work space for games by these rules.
 
     Args:
@@ -82,7 +82,7 @@ def make_desk(config: GameConfig, population: int, generations: int, horizon: in
     n, repeats = config.n_boats, max(round(move_s / config.decision_s), 1)
     decisions = horizon * repeats
     steps = decisions * config.decision_steps
-    desk = Desk(
+    scratch = Scratch(
         repeats=repeats,
         generations=generations,
         bench=make_games(config, 1),
@@ -99,7 +99,7 @@ def make_desk(config: GameConfig, population: int, generations: int, horizon: in
         commands=np.zeros((1, n, 2)),
         brood=np.zeros((population, horizon), np.int64),
     )
-    return share(desk)
+    return share(scratch)
 
 
 @kernel
@@ -112,7 +112,7 @@ def evolve(
     hints: IntArray,
     home: Array,
     rng: np.random.Generator,
-    desk: Desk,
+    scratch: Scratch,
 ) -> float:
     """Improve one boat's plan while the others keep theirs; return the fitness of the best plan found.
 
@@ -125,16 +125,16 @@ def evolve(
         hints: (k,) macro-actions to try for the whole plan, such as straight to the flag.
         home: (2,) where the boat takes the flag, m.
         rng: random numbers of mutations.
-        desk: work space.
+        scratch: work space.
     """
-    copy_game(desk.marks, 0, games, b)
+    copy_game(scratch.marks, 0, games, b)
     for k in range(N_COUNTED):
-        desk.marked[0, k] = 0.0
-    own, brood = plans[boat], desk.brood
+        scratch.marked[0, k] = 0.0
+    own, brood = plans[boat], scratch.brood
     population, horizon = brood.shape
-    roll_out(rules, desk, plans, boat, 0, True)
-    worth = worth_of(rules, desk, boat, home)
-    for generation in range(desk.generations):
+    roll_out(rules, scratch, plans, boat, 0, True)
+    score = score_of(rules, scratch, boat, home)
+    for generation in range(scratch.generations):
         _mutate(rng, own, brood)
         if generation == 0:
             for k in range(min(hints.size, population - 1)):
@@ -145,16 +145,16 @@ def evolve(
             if begin == horizon:
                 continue
             _copy_plan(own, brood[k])
-            roll_out(rules, desk, plans, boat, begin, False)
+            roll_out(rules, scratch, plans, boat, begin, False)
             _copy_plan(own, brood[0])
-            found = worth_of(rules, desk, boat, home)
-            if found > worth:
-                worth, best, first = found, k, begin
+            found = score_of(rules, scratch, boat, home)
+            if found > score:
+                score, best, first = found, k, begin
         if best > 0:
             _copy_plan(own, brood[best])
-            if generation + 1 < desk.generations:
-                roll_out(rules, desk, plans, boat, first, True)
-    return worth
+            if generation + 1 < scratch.generations:
+                roll_out(rules, scratch, plans, boat, first, True)
+    return score
 
 
 @kernel
@@ -188,13 +188,13 @@ def _first_difference(plan: IntArray, other: IntArray) -> int:
 
 
 @lean_kernel
-def worth_of(rules: Rules, desk: Desk, boat: int, home: Array) -> float:
+def score_of(rules: Rules, scratch: Scratch, boat: int, home: Array) -> float:
     """Return the fitness of the plans just rolled out for a boat's team, see `PRICES`.
 
     Progress is the boat's nearness to its goal, 1 at it. Its goal is the flag or, if it carries it or is tagged, its
     home.
     """
-    c, team, games = desk.counted, rules.team[boat], desk.bench
+    c, team, games = scratch.counted, rules.team[boat], scratch.bench
     capture, grab, tag, mate_hit, near_mate, foe_hit, out, progress = PRICES
     sign = 1.0 if team == 0 else -1.0
     events = sign * (capture * c[CAPTURES] + grab * c[GRABS] + tag * c[TAGS])
@@ -227,24 +227,24 @@ def copy_game(to: Games, t: int, source: Games, b: int) -> None:
 
 
 @lean_kernel
-def roll_out(rules: Rules, desk: Desk, plans: IntArray, boat: int, begin: int, record: bool) -> None:
+def roll_out(rules: Rules, scratch: Scratch, plans: IntArray, boat: int, begin: int, record: bool) -> None:
     """Play plans (n, H) in the work space's game from the start of macro-action ``begin`` to their end; count events.
 
     With ``record`` all boats are simulated and recorded. Otherwise boats other than ``boat`` repeat their recorded
     motion as long as possible. Later events count less than early ones.
     """
-    games, horizon, c = desk.bench, plans.shape[1], desk.counted
-    copy_game(games, 0, desk.marks, begin)
-    copy_row(c, desk.marked[begin])
+    games, horizon, c = scratch.bench, plans.shape[1], scratch.counted
+    copy_game(games, 0, scratch.marks, begin)
+    copy_row(c, scratch.marked[begin])
     for i in range(rules.n_boats):
-        desk.as_recorded[i] = not record and i != boat and rules.obstacles.bounds.shape[0] == 0
+        scratch.as_recorded[i] = not record and i != boat and rules.obstacles.bounds.shape[0] == 0
     for move in range(begin, horizon):
         if record and move > begin:
-            copy_game(desk.marks, move, games, 0)
-            copy_row(desk.marked[move], c)
+            copy_game(scratch.marks, move, games, 0)
+            copy_row(scratch.marked[move], c)
         early = 1.0 - 0.5 * move / horizon
-        for repeat in range(desk.repeats):
-            _play_decision(rules, desk, plans, move, move * desk.repeats + repeat, record)
+        for repeat in range(scratch.repeats):
+            _play_decision(rules, scratch, plans, move, move * scratch.repeats + repeat, record)
             events = games.events[0]
             c[CAPTURES] += early * (events[0, CAPTURE] - events[1, CAPTURE])
             c[GRABS] += early * (events[0, GRAB] - events[1, GRAB])
@@ -255,22 +255,22 @@ def roll_out(rules: Rules, desk: Desk, plans: IntArray, boat: int, begin: int, r
 
 
 @lean_kernel
-def _play_decision(rules: Rules, desk: Desk, plans: IntArray, move: int, number: int, record: bool) -> None:
+def _play_decision(rules: Rules, scratch: Scratch, plans: IntArray, move: int, number: int, record: bool) -> None:
     """Play decision ``number`` of a rollout; contacts are left to `_count_pairs`."""
-    games, first = desk.bench, number * rules.decision_steps
+    games, first = scratch.bench, number * rules.decision_steps
     if record:
         for team in range(2):
-            desk.flag_taken[number, team] = games.flag_taken[0, team]
+            scratch.flag_taken[number, team] = games.flag_taken[0, team]
     begin_decision(rules, games)
     for i in range(rules.n_boats):
         if record:
-            desk.is_tagged[number, i] = games.is_tagged[0, i]
-        elif desk.as_recorded[i]:
-            _compare(rules, desk, i, number)
-        if desk.as_recorded[i]:
-            _put(rules, desk, i, first + rules.decision_steps - 1)
+            scratch.is_tagged[number, i] = games.is_tagged[0, i]
+        elif scratch.as_recorded[i]:
+            _compare(rules, scratch, i, number)
+        if scratch.as_recorded[i]:
+            _put(rules, scratch, i, first + rules.decision_steps - 1)
         else:
-            _sail(rules, desk, plans[i, move], i, first, record)
+            _sail(rules, scratch, plans[i, move], i, first, record)
     R.check_bounds(rules, games, 0, 1)
     R.check_grabs(rules, games, 0, 1)
     R.check_tags(rules, games, 0, 1)
@@ -279,44 +279,44 @@ def _play_decision(rules: Rules, desk: Desk, plans: IntArray, move: int, number:
 
 
 @lean_kernel
-def _compare(rules: Rules, desk: Desk, i: int, number: int) -> None:
+def _compare(rules: Rules, scratch: Scratch, i: int, number: int) -> None:
     """Check whether a boat's state is as recorded at the start of a decision; if not, restore its full state."""
-    games = desk.bench
-    as_tagged = games.is_tagged[0, i] == desk.is_tagged[number, i]
-    if as_tagged and games.flag_taken[0, rules.team[i]] == desk.flag_taken[number, rules.team[i]]:
+    games = scratch.bench
+    as_tagged = games.is_tagged[0, i] == scratch.is_tagged[number, i]
+    if as_tagged and games.flag_taken[0, rules.team[i]] == scratch.flag_taken[number, rules.team[i]]:
         return
-    desk.as_recorded[i] = False
+    scratch.as_recorded[i] = False
     step = number * rules.decision_steps - 1
     if step >= 0:
-        copy_row(games.state[0, i], desk.state[step, i])
-        games.error_is_float32[0, i] = desk.error_is_float32[step, i]
+        copy_row(games.state[0, i], scratch.state[step, i])
+        games.error_is_float32[0, i] = scratch.error_is_float32[step, i]
 
 
 @lean_kernel
-def _put(rules: Rules, desk: Desk, i: int, step: int) -> None:
+def _put(rules: Rules, scratch: Scratch, i: int, step: int) -> None:
     """Put a boat where it was after a recorded step, with the flag that it carries; nothing else of it is read."""
-    games, x, y = desk.bench, desk.state[step, i, L.X], desk.state[step, i, L.Y]
+    games, x, y = scratch.bench, scratch.state[step, i, L.X], scratch.state[step, i, L.Y]
     games.state[0, i, L.X], games.state[0, i, L.Y] = x, y
-    games.on_side[0, i] = desk.on_side[step, i]
+    games.on_side[0, i] = scratch.on_side[step, i]
     if games.has_flag[0, i]:
         games.flag_position[0, 1 - rules.team[i], 0] = x
         games.flag_position[0, 1 - rules.team[i], 1] = y
 
 
 @lean_kernel
-def _sail(rules: Rules, desk: Desk, action: int, i: int, first: int, record: bool) -> None:
+def _sail(rules: Rules, scratch: Scratch, action: int, i: int, first: int, record: bool) -> None:
     """Simulate a boat through the steps of a decision under a macro-action."""
-    games = desk.bench
+    games = scratch.bench
     heading = games.state[0, i, L.HEADING]
-    desk.wanted[0, i, 0] = 0.0 if action == STOP else rules.max_speed[i]
-    desk.wanted[0, i, 1] = wrap_bearing((45.0 * action if action != STOP else heading) - heading)
+    scratch.wanted[0, i, 0] = 0.0 if action == STOP else rules.max_speed[i]
+    scratch.wanted[0, i, 1] = wrap_bearing((45.0 * action if action != STOP else heading) - heading)
     for step in range(first, first + rules.decision_steps):
-        decide_boat(rules, games, desk.wanted, desk.commands, 0, i)
-        move_boat(rules, games, desk.commands, 0, i)
+        decide_boat(rules, games, scratch.wanted, scratch.commands, 0, i)
+        move_boat(rules, games, scratch.commands, 0, i)
         if record:
-            copy_row(desk.state[step, i], games.state[0, i])
-            desk.error_is_float32[step, i] = games.error_is_float32[0, i]
-            desk.on_side[step, i] = games.on_side[0, i]
+            copy_row(scratch.state[step, i], games.state[0, i])
+            scratch.error_is_float32[step, i] = games.error_is_float32[0, i]
+            scratch.on_side[step, i] = games.on_side[0, i]
 
 
 @lean_kernel

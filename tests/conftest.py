@@ -129,7 +129,7 @@ def synthetic_record(meta, steps, seed=3):
         oob=np.zeros((steps + 1, n), bool),
         flag_position=flag_position,
         captures=np.where(np.arange(steps + 1)[:, None] >= 40, [1, 0], [0, 0]),
-        nominal=wanted,
+        wanted=wanted,
         sent=sent,
         reason=reason,
         intervened=intervened,

@@ -13,9 +13,9 @@ class Rush(EntrantTeam):
 
     name = "rush"
 
-    def decide(self, sight):
+    def decide(self, obs):
         """One order a boat."""
-        return [go(boat, sight.goal) for boat in sight.own]
+        return [go(boat, obs.goal) for boat in obs.own]
 
 
 check_policy("rush")

@@ -22,9 +22,9 @@ from typing import TypeVar
 from steerclear.shield.exceptions import PolicyError
 
 from .catalogue import entrant
+from .observation import Boat, Observation, Point
 from .plane import STOP_MPS, Order, distance, dock, heading_to
 from .play import EntrantTeam
-from .sight import Boat, Point, Sight
 
 Cell = tuple[int, int]
 State = tuple[Cell, bool]
@@ -75,33 +75,33 @@ class GridProblem:
         return [to for x, y in moves if self.is_open(to := (cell[0] + x, cell[1] + y))]
 
 
-def cell_at(sight: Sight, point: Point) -> Cell:
+def cell_at(obs: Observation, point: Point) -> Cell:
     """Return the cell of a point; for one outside the field, the nearest cell."""
-    column, row = int(point[0] / sight.size[0] * COLUMNS), int(point[1] / sight.size[1] * ROWS)
+    column, row = int(point[0] / obs.size[0] * COLUMNS), int(point[1] / obs.size[1] * ROWS)
     return min(max(column, 0), COLUMNS - 1), min(max(row, 0), ROWS - 1)
 
 
-def middle_of(sight: Sight, cell: Cell) -> Point:
+def middle_of(obs: Observation, cell: Cell) -> Point:
     """Return the middle of a cell, m."""
-    return (cell[0] + 0.5) * sight.size[0] / COLUMNS, (cell[1] + 0.5) * sight.size[1] / ROWS
+    return (cell[0] + 0.5) * obs.size[0] / COLUMNS, (cell[1] + 0.5) * obs.size[1] / ROWS
 
 
-def problem_at(sight: Sight, planner: int, contact_m: float) -> GridProblem:
+def problem_at(obs: Observation, planner: int, contact_m: float) -> GridProblem:
     """Return the problem of an own boat; watched are cells within ``contact_m`` of an opponent that may tag."""
-    boat, own = sight.own[planner], int(sight.line / sight.size[0] * COLUMNS)
-    start = cell_at(sight, boat.at)
-    mates = {cell_at(sight, mate.at) for number, mate in enumerate(sight.own) if number != planner}
-    taggers = [foe.at for foe in sight.foes if _may_tag(foe, sight)]
+    boat, own = obs.own[planner], int(obs.line / obs.size[0] * COLUMNS)
+    start = cell_at(obs, boat.at)
+    mates = {cell_at(obs, mate.at) for number, mate in enumerate(obs.own) if number != planner}
+    taggers = [foe.at for foe in obs.foes if _may_tag(foe, obs)]
     # the cell on the line counts as foreign: the zone begins where a boat is certainly inside
-    cells = [((column, row), middle_of(sight, (column, row))) for column in range(own, COLUMNS) for row in range(ROWS)]
+    cells = [((column, row), middle_of(obs, (column, row))) for column in range(own, COLUMNS) for row in range(ROWS)]
     watched = {cell for cell, middle in cells if any(distance(middle, at) <= contact_m for at in taggers)}
-    flag = frozenset(cell for cell, middle in cells if distance(middle, sight.goal) < sight.reach)
+    flag = frozenset(cell for cell, middle in cells if distance(middle, obs.goal) < obs.reach)
     return GridProblem(start, boat.carries, flag, own, frozenset(mates - {start}), frozenset(watched - {start}))
 
 
-def _may_tag(foe: Boat, sight: Sight) -> bool:
+def _may_tag(foe: Boat, obs: Observation) -> bool:
     """Return whether an opponent may tag now or when a boat arrives: near its base a tagged one is soon free."""
-    soon_free = distance(foe.at, sight.base) < 2.0 * sight.reach
+    soon_free = distance(foe.at, obs.base) < 2.0 * obs.reach
     return foe.recharged and foe.on_side and (soon_free or not foe.tagged)
 
 
@@ -174,11 +174,11 @@ def _planned(problem: GridProblem) -> list[Cell]:
     return bolt(problem) if problem.carrying else []
 
 
-def _farthest(sight: Sight, at: Point, plan: list[Cell], problem: GridProblem) -> int:
+def _farthest(obs: Observation, at: Point, plan: list[Cell], problem: GridProblem) -> int:
     """Return the last cell of the plan that a straight line reaches, at most the first one of the flag."""
     found = 0
     for number, cell in enumerate(plan):
-        if number and not _straight(sight, at, middle_of(sight, cell), problem):
+        if number and not _straight(obs, at, middle_of(obs, cell), problem):
             break
         found = number
         if cell in problem.flag and not problem.carrying:
@@ -186,11 +186,11 @@ def _farthest(sight: Sight, at: Point, plan: list[Cell], problem: GridProblem) -
     return found
 
 
-def _straight(sight: Sight, a: Point, b: Point, problem: GridProblem) -> bool:
+def _straight(obs: Observation, a: Point, b: Point, problem: GridProblem) -> bool:
     """Return whether all cells on the line from a to b are open."""
     steps = max(math.ceil(distance(a, b) / STEP_M), 1)
     points = ((a[0] + (b[0] - a[0]) * k / steps, a[1] + (b[1] - a[1]) * k / steps) for k in range(steps + 1))
-    return all(problem.is_open(cell_at(sight, point)) for point in points)
+    return all(problem.is_open(cell_at(obs, point)) for point in points)
 
 
 @entrant("chao", "the middle boat plans on a grid, by A*, mates sail circles (Chao-NIWC-PAC)", "Chao-NIWC-PAC")
@@ -219,45 +219,45 @@ class Chao(EntrantTeam):
         self._contact_m = contact_m
         self.think_times_s: list[float] = []
 
-    def begin(self, sight: Sight) -> None:
+    def begin(self, obs: Observation) -> None:
         """Begin a game without a plan."""
         self.think_times_s = []
-        self._middle, self._plan, self._step = len(sight.own) // 2, list[Cell](), -1
+        self._middle, self._plan, self._step = len(obs.own) // 2, list[Cell](), -1
         self._aim: int | None = None
         self._asked: GridProblem | None = None
         self._planned_s, self._carried = -math.inf, False
         self._every = max(round(LOOK_S / self.dt_s), 2)
         self._later = min(max(round(TAKEN_S / self.dt_s), 1), self._every - 1)
 
-    def decide(self, sight: Sight) -> list[Order]:
+    def decide(self, obs: Observation) -> list[Order]:
         """Replan at times, follow the plan, and let the teammates circle.
 
         Those before the planner circle to one side, the others to the other.
         """
         self._step += 1
-        self._think(sight)
-        turns = [math.radians(-CIRCLE_DEG if number < self._middle else CIRCLE_DEG) for number in range(len(sight.own))]
-        orders = [(CIRCLE_SHARE * boat.top, boat.heading + turn) for boat, turn in zip(sight.own, turns, strict=True)]
-        orders[self._middle] = self._follow(sight)
+        self._think(obs)
+        turns = [math.radians(-CIRCLE_DEG if number < self._middle else CIRCLE_DEG) for number in range(len(obs.own))]
+        orders = [(CIRCLE_SHARE * boat.top, boat.heading + turn) for boat, turn in zip(obs.own, turns, strict=True)]
+        orders[self._middle] = self._follow(obs)
         return orders
 
-    def _think(self, sight: Sight) -> None:
+    def _think(self, obs: Observation) -> None:
         phase = self._step % self._every
-        if phase == 0 and not sight.own[self._middle].tagged:
+        if phase == 0 and not obs.own[self._middle].tagged:
             self._aim = None  # obstacles may have gone
-            self._problem = self._now(sight)
-            if not self._plan_holds(self._problem) or sight.time - self._planned_s >= REPLAN_S:
-                self._planned_s, self._asked = sight.time, self._problem
+            self._problem = self._now(obs)
+            if not self._plan_holds(self._problem) or obs.time - self._planned_s >= REPLAN_S:
+                self._planned_s, self._asked = obs.time, self._problem
         elif phase == self._later and self._asked is not None:
             begun = time.perf_counter()
             self._plan, self._aim, self._asked = _planned(self._asked), None, None
             self.think_times_s.append(time.perf_counter() - begun)
 
-    def _now(self, sight: Sight) -> GridProblem:
+    def _now(self, obs: Observation) -> GridProblem:
         """Return the problem with the widest contacts that leave a path; with the least if none does."""
         given = self._contact_m
-        for radius in [share * sight.reach for share in CONTACT_SHARES] if given is None else [given]:
-            problem = problem_at(sight, self._middle, radius)
+        for radius in [share * obs.reach for share in CONTACT_SHARES] if given is None else [given]:
+            problem = problem_at(obs, self._middle, radius)
             if search(problem) is not None:
                 break
         return problem
@@ -267,9 +267,9 @@ class Chao(EntrantTeam):
         same, self._carried = self._carried == problem.carrying, problem.carrying
         return bool(self._plan) and same and all(map(problem.is_open, self._plan))
 
-    def _follow(self, sight: Sight) -> Order:
-        boat = sight.own[self._middle]
-        here, at = cell_at(sight, boat.at), dock(boat, sight)
+    def _follow(self, obs: Observation) -> Order:
+        boat = obs.own[self._middle]
+        here, at = cell_at(obs, boat.at), dock(boat, obs)
         if boat.carries and boat.on_side and at is not None:
             return boat.top, heading_to(boat.at, at)  # nobody tags it in the own zone: plans end at the line
         if here in self._plan[: 1 if self._aim is None else self._aim + 1]:
@@ -277,5 +277,5 @@ class Chao(EntrantTeam):
         if not self._plan:
             return STOP_MPS, boat.heading
         if self._aim is None:
-            self._aim = _farthest(sight, boat.at, self._plan, self._problem)
-        return boat.top, heading_to(boat.at, middle_of(sight, self._plan[self._aim]))
+            self._aim = _farthest(obs, boat.at, self._plan, self._problem)
+        return boat.top, heading_to(boat.at, middle_of(obs, self._plan[self._aim]))

@@ -11,10 +11,10 @@ from itertools import combinations
 import numpy as np
 
 from .catalogue import entrant
+from .observation import Boat, Observation, Point
 from .plane import GAP_M, STOP_MPS, Order, ahead, assign, clip, cross, distance, heading_to, meeting_point, row, wrap
 from .plane import go as go_to
 from .play import EntrantTeam
-from .sight import Boat, Point, Sight
 
 REACHES = 1.3
 ANEW_S = 3.0
@@ -50,46 +50,46 @@ class Alamer(EntrantTeam):
 
     name = "alamer"
 
-    def begin(self, sight: Sight) -> None:
+    def begin(self, obs: Observation) -> None:
         """Begin a game without points."""
-        self._moving = [True] * len(sight.own)
+        self._moving = [True] * len(obs.own)
         self._points: list[Point] = []
         self._until_s = -math.inf
 
-    def decide(self, sight: Sight) -> list[Order]:
+    def decide(self, obs: Observation) -> list[Order]:
         """Steer to the points, hold there and face the nearest opponents."""
-        if sight.time >= self._until_s:
-            self._until_s = sight.time + ANEW_S
-            points = _apart(sight, [_interception(sight, foe) for foe in sight.foes])
-            chosen = assign([boat.at for boat in sight.own], points)
-            self._points = [points[n] if n >= 0 else boat.at for boat, n in zip(sight.own, chosen, strict=True)]
-        return [self._order(sight, number, boat) for number, boat in enumerate(sight.own)]
+        if obs.time >= self._until_s:
+            self._until_s = obs.time + ANEW_S
+            points = _apart(obs, [_interception(obs, foe) for foe in obs.foes])
+            chosen = assign([boat.at for boat in obs.own], points)
+            self._points = [points[n] if n >= 0 else boat.at for boat, n in zip(obs.own, chosen, strict=True)]
+        return [self._order(obs, number, boat) for number, boat in enumerate(obs.own)]
 
-    def _order(self, sight: Sight, number: int, boat: Boat) -> Order:
+    def _order(self, obs: Observation, number: int, boat: Boat) -> Order:
         point = self._points[number]
         self._moving[number] = distance(boat.at, point) > (ALAMER_ARRIVED_M if self._moving[number] else ALAMER_LEFT_M)
         if self._moving[number]:
             return go_to(boat, point)
-        foe = min(sight.foes, key=lambda foe: distance(boat.at, foe.at))
+        foe = min(obs.foes, key=lambda foe: distance(boat.at, foe.at))
         facing = heading_to(boat.at, foe.at)
         return (TURNING_SHARE * boat.top if abs(wrap(facing - boat.heading)) > FACING_RAD else STOP_MPS), facing
 
 
-def _interception(sight: Sight, foe: Boat) -> Point:
+def _interception(obs: Observation, foe: Boat) -> Point:
     """Return the point of an opponent's way to the flag at which a boat waits for it."""
-    inner, outer = sight.keepout + foe.radius + 1.0, REACHES * sight.reach
-    x, y = ahead(sight.home, heading_to(sight.home, foe.at), clip(distance(sight.home, foe.at), inner, outer))
-    return clip(x, 2.0, sight.line - 2.0), clip(y, 2.0, sight.size[1] - 2.0)
+    inner, outer = obs.keepout + foe.radius + 1.0, REACHES * obs.reach
+    x, y = ahead(obs.home, heading_to(obs.home, foe.at), clip(distance(obs.home, foe.at), inner, outer))
+    return clip(x, 2.0, obs.line - 2.0), clip(y, 2.0, obs.size[1] - 2.0)
 
 
-def _apart(sight: Sight, points: list[Point]) -> list[Point]:
+def _apart(obs: Observation, points: list[Point]) -> list[Point]:
     """Return the points, with those too near to an earlier one moved round the flag."""
     kept: list[Point] = []
     for point in points:
-        radius, heading = distance(sight.home, point), heading_to(sight.home, point)
+        radius, heading = distance(obs.home, point), heading_to(obs.home, point)
         step = GAP_M / max(radius, 1.0)
-        tries = [ahead(sight.home, heading + sign * k * step, radius) for k in range(4) for sign in (1.0, -1.0)]
-        inside = [p for p in tries if 1.0 < p[0] < sight.line and 1.0 < p[1] < sight.size[1] - 1.0]
+        tries = [ahead(obs.home, heading + sign * k * step, radius) for k in range(4) for sign in (1.0, -1.0)]
+        inside = [p for p in tries if 1.0 < p[0] < obs.line and 1.0 < p[1] < obs.size[1] - 1.0]
         fits = [p for p in inside if all(distance(p, other) >= 0.9 * GAP_M for other in kept)]
         kept.append(fits[0] if fits else point)
     return kept
@@ -106,27 +106,27 @@ class Meo(EntrantTeam):
 
     name = "meo"
 
-    def decide(self, sight: Sight) -> list[Order]:
+    def decide(self, obs: Observation) -> list[Order]:
         """Steer to the intercept points at full speed; reverse one of two crossing boats."""
-        ways = [(boat.at, point) for boat, point in zip(sight.own, _marked(sight), strict=True)]
+        ways = [(boat.at, point) for boat, point in zip(obs.own, _marked(obs), strict=True)]
         crossing = {j for i, j in combinations(range(len(ways)), 2) if cross(*ways[i], *ways[j])}
         headings = [heading_to(*way) + (math.pi if number in crossing else 0.0) for number, way in enumerate(ways)]
         return [
             (STOP_MPS if distance(*way) <= MEO_ARRIVED_M else boat.top, heading)
-            for boat, way, heading in zip(sight.own, ways, headings, strict=True)
+            for boat, way, heading in zip(obs.own, ways, headings, strict=True)
         ]
 
 
-def _marked(sight: Sight) -> list[Point]:
+def _marked(obs: Observation) -> list[Point]:
     """Return where each own boat meets the attacker it marks; its own place if there are fewer attackers."""
 
     def met(boat: Boat, foe: Boat) -> Point:
         x, y = meeting_point(boat, foe)
-        return clip(x, MARGIN_M, sight.line - MARGIN_M), clip(y, MARGIN_M, sight.size[1] - MARGIN_M)
+        return clip(x, MARGIN_M, obs.line - MARGIN_M), clip(y, MARGIN_M, obs.size[1] - MARGIN_M)
 
-    points = [[met(boat, foe) for foe in sight.foes] for boat in sight.own]
-    costs = np.array([[distance(boat.at, p) for p in some] for boat, some in zip(sight.own, points, strict=True)])
-    found = [boat.at for boat in sight.own]
+    points = [[met(boat, foe) for foe in obs.foes] for boat in obs.own]
+    costs = np.array([[distance(boat.at, p) for p in some] for boat, some in zip(obs.own, points, strict=True)])
+    found = [boat.at for boat in obs.own]
     from scipy.optimize import linear_sum_assignment  # importing it takes a while
 
     for boat, foe in zip(*linear_sum_assignment(costs), strict=True):
@@ -144,16 +144,16 @@ class Ohto(EntrantTeam):
 
     name = "ohto"
 
-    def begin(self, sight: Sight) -> None:
+    def begin(self, obs: Observation) -> None:
         """Choose each boat's station."""
-        posts = row(sight)
-        self._posts: list[Point] = [posts[number] for number in assign([boat.at for boat in sight.own], posts)]
-        self._far_m = DRIVEN_OFF * sight.size[1] / (len(posts) + 1)
-        self._moving = [True] * len(sight.own)
+        posts = row(obs)
+        self._posts: list[Point] = [posts[number] for number in assign([boat.at for boat in obs.own], posts)]
+        self._far_m = DRIVEN_OFF * obs.size[1] / (len(posts) + 1)
+        self._moving = [True] * len(obs.own)
 
-    def decide(self, sight: Sight) -> list[Order]:
+    def decide(self, obs: Observation) -> list[Order]:
         """Hold; return to the post if the game moved a boat away."""
-        return [self._order(boat, number) for number, boat in enumerate(sight.own)]
+        return [self._order(boat, number) for number, boat in enumerate(obs.own)]
 
     def _order(self, boat: Boat, number: int) -> Order:
         post = self._posts[number]

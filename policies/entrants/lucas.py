@@ -23,10 +23,10 @@ from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.jit import Array, BoolArray, IntArray
 from steerclear.shield.platforms import layout as L
 
-from ..evolution import HEADINGS, STOP, evolve, follow_plans, make_desk
+from ..evolution import HEADINGS, STOP, evolve, follow_plans, make_scratch
 from .catalogue import entrant
+from .observation import docks_of
 from .play import BatchFront
-from .sight import docks_of
 
 MOVE_S = 1.2
 HORIZON = 15
@@ -68,7 +68,7 @@ class LucasBatch:
         rules = core.config
         model = rules.replace(dt_s=rules.dt_s if rules.decision_steps > 1 else max(STEP_S, rules.dt_s))
         self._rules = make_rules(model, field_geometry(model))
-        self._desk = make_desk(model, self._population, self._generations, self._horizon, MOVE_S)
+        self._scratch = make_scratch(model, self._population, self._generations, self._horizon, MOVE_S)
         self._team, self._own = team, np.flatnonzero(core.team == team)
         others = np.flatnonzero(core.team != team)
         self._turns = [int(boat) for pair in zip(self._own, others, strict=True) for boat in pair]
@@ -111,7 +111,7 @@ class LucasBatch:
         for boat in boats:
             home = home_of(core, int(core.team[boat]), boat, game)
             hints = hints_for(core, boat, home, game)
-            evolve(self._rules, core.games, game, plans, boat, hints, home, self._rngs[game], self._desk)
+            evolve(self._rules, core.games, game, plans, boat, hints, home, self._rngs[game], self._scratch)
         self.think_times_s.append((time.perf_counter() - begun) / len(boats))
 
 

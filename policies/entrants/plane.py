@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .sight import Boat, Point, Sight
+from .observation import Boat, Observation, Point
 
 Order = tuple[float, float]
 """Speed m/s and absolute heading rad in the own-end frame."""
@@ -51,9 +51,9 @@ def go(boat: Boat, point: Point, near_m: float = 2.0) -> Order:
     return boat.top * clip(way_m / SLOWING_M, SLOWEST, 1.0), towards
 
 
-def dock(boat: Boat, sight: Sight) -> Point | None:
+def dock(boat: Boat, obs: Observation) -> Point | None:
     """Return the nearest place where the flag must be brought; None if reaching the own side is enough."""
-    return min(sight.docks, key=lambda point: distance(boat.at, point), default=None)
+    return min(obs.docks, key=lambda point: distance(boat.at, point), default=None)
 
 
 def meeting_point(hunter: Boat, target: Boat) -> Point:
@@ -82,21 +82,21 @@ def cross(a: Point, b: Point, c: Point, d: Point) -> bool:
     return side(a, b, c) * side(a, b, d) < 0.0 and side(c, d, a) * side(c, d, b) < 0.0
 
 
-def arc(sight: Sight) -> list[Point]:
+def arc(obs: Observation) -> list[Point]:
     """Return a station per own boat, on the grab-radius circle round the own flag, on the side of the dividing line."""
-    radius = max(sight.reach, sight.keepout + max(boat.radius for boat in sight.own) + 1.0)
+    radius = max(obs.reach, obs.keepout + max(boat.radius for boat in obs.own) + 1.0)
     step = 2.0 * math.asin(min(GAP_M / (2.0 * radius), 1.0))
-    first = 0.5 * math.pi - 0.5 * step * (len(sight.own) - 1)
-    return [ahead(sight.home, first + k * step, radius) for k in range(len(sight.own))]
+    first = 0.5 * math.pi - 0.5 * step * (len(obs.own) - 1)
+    return [ahead(obs.home, first + k * step, radius) for k in range(len(obs.own))]
 
 
-def row(sight: Sight) -> list[Point]:
+def row(obs: Observation) -> list[Point]:
     """Return a station per own boat, in a row across the own half midway to the dividing line.
 
     These are the presets' start places.
     """
-    x, gap = 0.5 * (sight.home[0] + sight.line), sight.size[1] / (len(sight.own) + 1)
-    return [(x, gap * (k + 1)) for k in range(len(sight.own))]
+    x, gap = 0.5 * (obs.home[0] + obs.line), obs.size[1] / (len(obs.own) + 1)
+    return [(x, gap * (k + 1)) for k in range(len(obs.own))]
 
 
 def assign(starts: Sequence[Point], ends: Sequence[Point]) -> list[int]:

@@ -1,4 +1,4 @@
-"""`EntrantTeam`: base of all entrants; an entrant decides its boats' orders from a `Sight`."""
+"""`EntrantTeam`: base of all entrants; an entrant decides its boats' orders from an `Observation`."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import numpy as np
 from steerclear.shield.exceptions import PolicyError
 
 from ..scripted.team import boat_numbers, game_core
+from .observation import Observation, is_turned, look
 from .plane import Order, wrap
-from .sight import Sight, is_turned, look
 
 
 class EntrantTeam(ABC):
@@ -56,18 +56,18 @@ class EntrantTeam(ABC):
         """
         if not self._ids:
             raise PolicyError(f"entrant {self.name!r} has no game; call reset(env, agent_ids, seed) first")
-        sight = look(self.core, self.team)
-        orders = self.decide(sight)
+        obs = look(self.core, self.team)
+        orders = self.decide(obs)
         return {
             agent_id: (speed, math.degrees(wrap(heading - boat.heading)))
-            for agent_id, boat, (speed, heading) in zip(self._ids, sight.own, orders, strict=True)
+            for agent_id, boat, (speed, heading) in zip(self._ids, obs.own, orders, strict=True)
         }
 
-    def begin(self, sight: Sight) -> None:  # noqa: B027 (most entrants remember nothing)
+    def begin(self, obs: Observation) -> None:  # noqa: B027 (most entrants remember nothing)
         """Begin a game, given the view of its start."""
 
     @abstractmethod
-    def decide(self, sight: Sight) -> list[Order]:
+    def decide(self, obs: Observation) -> list[Order]:
         """Return an order for each own boat."""
 
 
@@ -76,13 +76,13 @@ class BatchFront(EntrantTeam):
 
     _batch: Any
 
-    def begin(self, sight: Sight) -> None:
+    def begin(self, obs: Observation) -> None:
         """Begin the batch of one game."""
         self._batch.reset(self.core, self.team, self.seed)
 
-    def decide(self, sight: Sight) -> list[Order]:
+    def decide(self, obs: Observation) -> list[Order]:
         """Return the commands of the batch policy."""
         commands = self._batch.act(self.core, self.team)[0].tolist()
         return [
-            (speed, boat.heading + math.radians(turn)) for boat, (speed, turn) in zip(sight.own, commands, strict=True)
+            (speed, boat.heading + math.radians(turn)) for boat, (speed, turn) in zip(obs.own, commands, strict=True)
         ]

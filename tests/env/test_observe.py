@@ -31,23 +31,23 @@ def described(view, i):
     width, height = config.env_bounds_m
     (x, y), heading, team = view.position[i], view.heading_deg[i], i // size
 
-    def sight(px, py):
+    def obs(px, py):
         return (math.degrees(math.atan2(px - x, py - y)) - heading, math.hypot(px - x, py - y))
 
     def wall(axis, at):
         ends = (min(max(x, 0.0), width), min(max(y, 0.0), height))
-        return sight(at, ends[1]) if axis == 0 else sight(ends[0], at)
+        return obs(at, ends[1]) if axis == 0 else obs(ends[0], at)
 
     walls = [wall(1, 0.0), wall(0, 0.0), wall(1, height), wall(0, width)]
     if team == 1:
         walls = walls[2:] + walls[:2]
-    seen = [sight(*view.flag_home[1 - team]), sight(*view.flag_home[team]), *walls, wall(0, width / 2)]
+    seen = [obs(*view.flag_home[1 - team]), obs(*view.flag_home[team]), *walls, wall(0, width / 2)]
     numbers = [value for pair in seen for value in pair]
     numbers += [view.speed_mps[i], *status(view, i), view.captures[team], view.captures[1 - team]]
     for j in [j for j in range(n) if j // size == team and j != i] + [j for j in range(n) if j // size != team]:
         px, py = view.position[j]
         back = math.degrees(math.atan2(x - px, y - py))
-        numbers += [*sight(px, py), view.heading_deg[j] - back, view.speed_mps[j], *status(view, j)]
+        numbers += [*obs(px, py), view.heading_deg[j] - back, view.speed_mps[j], *status(view, j)]
     return np.array(numbers, dtype=float)
 
 

@@ -14,10 +14,10 @@ from steerclear.env.field import field_geometry
 from steerclear.env.mctf import MctfEnv
 from steerclear.policies.entrants import catalogue, plane
 from steerclear.policies.entrants.lucas import hints_for, home_of
+from steerclear.policies.entrants.observation import Boat, look
 from steerclear.policies.entrants.plane import row
 from steerclear.policies.entrants.play import EntrantTeam
-from steerclear.policies.entrants.sight import Boat, look
-from steerclear.policies.evolution import N_MOVES, STOP, copy_game, evolve, make_desk, roll_out, worth_of
+from steerclear.policies.evolution import N_MOVES, STOP, copy_game, evolve, make_scratch, roll_out, score_of
 from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.foreign import load_others
 
@@ -129,8 +129,8 @@ def test_a_newcomer_is_a_policy_by_name(monkeypatch):
     class Rush(EntrantTeam):
         name = "rush"
 
-        def decide(self, sight):
-            return [plane.go(boat, sight.goal) for boat in sight.own]
+        def decide(self, obs):
+            return [plane.go(boat, obs.goal) for boat in obs.own]
 
     sent, _ = play("rush", steps=2)
     assert (sent[..., 0] > 0.0).all()
@@ -150,8 +150,8 @@ def test_another_package_enters_a_team_by_an_entry_point(tmp_path, monkeypatch, 
         "from steerclear.policies.entrants.play import EntrantTeam\n"
         "@entrant('theirs', 'stays')\n"
         "class Theirs(EntrantTeam):\n"
-        "    def decide(self, sight):\n"
-        "        return [(0.0, boat.heading) for boat in sight.own]\n"
+        "    def decide(self, obs):\n"
+        "        return [(0.0, boat.heading) for boat in obs.own]\n"
     )
     info = tmp_path / "their_team-1.0.dist-info"
     info.mkdir()
@@ -232,21 +232,21 @@ def scenes(config, every=40, steps=400):
 )
 def test_what_a_search_found_is_worth_what_a_whole_rollout_says(config):
     rules, rng = make_rules(config, field_geometry(config)), np.random.default_rng(3)
-    desk, whole = (make_desk(config, 10, 3, HORIZON, 1.2) for _ in range(2))
+    scratch, whole = (make_scratch(config, 10, 3, HORIZON, 1.2) for _ in range(2))
     changed, tagged = 0, 0
     for number, core in enumerate(scenes(config)):
         game, boat = number % 2, number % core.n_boats
         plans = rng.integers(0, N_MOVES, (core.n_boats, HORIZON))
         before, home = plans.copy(), home_of(core, int(core.team[boat]), boat, game)
         hints = hints_for(core, boat, home, game)
-        found = evolve(rules, core.games, game, plans, boat, hints, home, rng, desk)
+        found = evolve(rules, core.games, game, plans, boat, hints, home, rng, scratch)
         copy_game(whole.marks, 0, core.games, game)
         roll_out(rules, whole, plans, boat, 0, True)
-        assert found == worth_of(rules, whole, boat, home)
+        assert found == score_of(rules, whole, boat, home)
         others = np.arange(core.n_boats) != boat
         assert (plans[others] == before[others]).all()
         roll_out(rules, whole, before, boat, 0, True)
-        assert found >= worth_of(rules, whole, boat, home)
+        assert found >= score_of(rules, whole, boat, home)
         changed += bool((plans != before).any())
         tagged += int(core.is_tagged.sum())
     assert changed > 5

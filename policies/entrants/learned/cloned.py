@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from steerclear.env.whole_file import whole_file
 from steerclear.shield.exceptions import PolicyError
 
+from ..observation import Boat, Observation
 from ..options import OPTIONS, OptionPlayer, row_of, target
 from ..plane import distance
-from ..sight import Boat, Sight
 from .network import UNREADABLE
 
 Floats = NDArray[np.float64]
@@ -134,9 +134,9 @@ class Cloned(OptionPlayer):
         super().__init__()
         self._chooser: Any = read_chooser(path)
 
-    def wish(self, sight: Sight, number: int) -> str:
+    def wish(self, obs: Observation, number: int) -> str:
         """Return the demonstrator's most likely choice."""
-        row = row_of(sight, number, self._choices[number])
+        row = row_of(obs, number, self._choices[number])
         seen = [[float(row[name]) for name in self._chooser.names]]
         return OPTION_NAMES[int(self._chooser.choices(seen)[0])]
 
@@ -156,22 +156,22 @@ class Teacher(OptionPlayer):
         super().__init__()
         self.rows: list[dict[str, Any]] = []
 
-    def look_round(self, sight: Sight) -> None:
+    def look_round(self, obs: Observation) -> None:
         """Choose, and store the choices."""
-        super().look_round(sight)
-        self.rows += [row_of(sight, number, choice) for number, choice in enumerate(self._choices)]
+        super().look_round(obs)
+        self.rows += [row_of(obs, number, choice) for number, choice in enumerate(self._choices)]
 
-    def wish(self, sight: Sight, number: int) -> str:
+    def wish(self, obs: Observation, number: int) -> str:
         """Return the boat's option, see the class."""
-        boat, foe = sight.own[number], target(sight, number)
+        boat, foe = obs.own[number], target(obs, number)
         if boat.carries:
             return "retreat"
-        if foe is not None and boat.recharged and boat.on_side and _is_nearest(sight, number, foe):
+        if foe is not None and boat.recharged and boat.on_side and _is_nearest(obs, number, foe):
             return "tag"
-        return "attack" if boat.y > 0.5 * sight.size[1] or boat.x > sight.line else "flank"
+        return "attack" if boat.y > 0.5 * obs.size[1] or boat.x > obs.line else "flank"
 
 
-def _is_nearest(sight: Sight, number: int, foe: Boat) -> bool:
+def _is_nearest(obs: Observation, number: int, foe: Boat) -> bool:
     """Return whether the boat is the nearest free own one to an opponent that has come near."""
-    ways = [distance(boat.at, foe.at) if not boat.tagged else 1e9 for boat in sight.own]
+    ways = [distance(boat.at, foe.at) if not boat.tagged else 1e9 for boat in obs.own]
     return ways[number] == min(ways) and ways[number] < THREAT_M

@@ -16,9 +16,9 @@ from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.jit import Array, BoolArray
 from steerclear.shield.platforms import layout as L
 
+from ..observation import is_turned, look
 from ..plane import SLOWEST, SLOWING_M
 from ..play import BatchFront
-from ..sight import is_turned, look
 from ..undertow.raid import Chart, Phase, Raid
 from ..undertow.shape import SCRIPTED
 from ..undertow.team import aim_of
@@ -112,13 +112,13 @@ class RaidsBatch:
     def aim(self, games: Numbers, steps: int) -> None:
         """Set the points that the boats of some games steer for, for ``steps`` game steps."""
         for game in games:
-            sight, raid = look(self._core, self._team, int(game)), self.raids[game]
-            chart = Chart(sight, raid.upper, raid.shape)
-            for number, boat in enumerate(sight.own):
+            obs, raid = look(self._core, self._team, int(game)), self.raids[game]
+            chart = Chart(obs, raid.upper, raid.shape)
+            for number, boat in enumerate(obs.own):
                 self._stays[game, number] = boat.tagged
                 if boat.tagged:  # the game controls it
                     continue
-                aim = aim_of(raid, sight, chart, number)
+                aim = aim_of(raid, obs, chart, number)
                 self._points[game, number] = aim.point
                 self._near_m[game, number] = math.nan if aim.near_m is None else aim.near_m
         self._left[games] = steps

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..observation import Boat, Observation
 from ..plane import wrap
-from ..sight import Boat, Sight
 
 SAMPLE_S = 1.0
 """Time between two samples."""
@@ -54,12 +54,12 @@ class Habits:
         self._kept, self._breaks = [0] * foes, [0] * foes
         self._next_s = -np.inf
 
-    def look(self, sight: Sight) -> bool:
+    def look(self, obs: Observation) -> bool:
         """Store a sample if one is due; return whether it was."""
-        if sight.time < self._next_s - 1e-6:
+        if obs.time < self._next_s - 1e-6:
             return False
-        self._next_s = sight.time + SAMPLE_S
-        for number, foe in enumerate(sight.foes):
+        self._next_s = obs.time + SAMPLE_S
+        for number, foe in enumerate(obs.foes):
             self._compare(number, foe)
             row = foe.x, foe.y, wrap(foe.heading), float(foe.tagged), float(foe.on_side)
             self._looks[number] = [*self._looks[number], row][-KEPT:]
@@ -113,22 +113,22 @@ class Watch:
         nobody: no opponent stays at home, according to a restored memory.
     """
 
-    def __init__(self, sight: Sight) -> None:
-        self.habits, self.nobody = Habits(len(sight.foes)), False
-        self._left, self._numbers = set[int](), range(len(sight.foes))
-        self._lured_s = sight.time
+    def __init__(self, obs: Observation) -> None:
+        self.habits, self.nobody = Habits(len(obs.foes)), False
+        self._left, self._numbers = set[int](), range(len(obs.foes))
+        self._lured_s = obs.time
 
-    def look(self, sight: Sight) -> bool:
+    def look(self, obs: Observation) -> bool:
         """Note where all boats are; return whether habits were sampled."""
-        if any(boat.x > sight.line - LURE_M for boat in sight.own):
-            self._lured_s = sight.time
-        near = sight.line - COME_M
-        roams = sight.line + ROAMS_SHARE * (sight.base[0] - sight.line)
-        quiet = sight.time - self._lured_s > QUIET_S
+        if any(boat.x > obs.line - LURE_M for boat in obs.own):
+            self._lured_s = obs.time
+        near = obs.line - COME_M
+        roams = obs.line + ROAMS_SHARE * (obs.base[0] - obs.line)
+        quiet = obs.time - self._lured_s > QUIET_S
         self._left |= {
-            n for n, foe in enumerate(sight.foes) if foe.x < near or (quiet and foe.x < roams and not foe.tagged)
+            n for n, foe in enumerate(obs.foes) if foe.x < near or (quiet and foe.x < roams and not foe.tagged)
         }
-        return self.habits.look(sight)
+        return self.habits.look(obs)
 
     @property
     def unguarded(self) -> bool:

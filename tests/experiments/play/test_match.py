@@ -139,8 +139,8 @@ def test_an_opening_stays_clear_of_obstacles_and_says_when_there_is_no_room():
 class Curious(EntrantTeam):
     """An entrant that looks at its infos."""
 
-    def decide(self, sight):
-        return [(0.0, boat.heading) for boat in sight.own]
+    def decide(self, obs):
+        return [(0.0, boat.heading) for boat in obs.own]
 
     def act(self, observations, infos):
         self.seen = set(infos)

@@ -8,7 +8,7 @@ import pytest
 from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
-from steerclear.policies.entrants.sight import look
+from steerclear.policies.entrants.observation import look
 from steerclear.policies.entrants.undertow.habits import LEAD, WARY, Habits
 from steerclear.policies.entrants.undertow.passage import Waters, outward
 from steerclear.policies.entrants.undertow.raid import Phase, Raid
@@ -21,47 +21,47 @@ APART = [[20.0, 25.0], [20.0, 15.0], [38.0, 20.0], [75.0, 38.0], [75.0, 2.0], [5
 ROUND_S, FAR_M = 20.0, -1000.0
 
 
-def sight_of(places):
+def observed(places):
     env = MctfEnv("aamas2024")
     env.reset(seed=1, options={"init_dict": {"agent_position": places}})
     return look(env.core, 0)
 
 
 @pytest.fixture
-def sight():
-    return sight_of(PLACES)
+def obs():
+    return observed(PLACES)
 
 
 @pytest.fixture
 def apart():
-    return sight_of(APART)
+    return observed(APART)
 
 
-def moved(sight, time_s=0.0, own=None, foes=None):
+def moved(obs, time_s=0.0, own=None, foes=None):
     """The same moment with some boats changed: number to fields."""
-    boats = {side: list(getattr(sight, side)) for side in ("own", "foes")}
+    boats = {side: list(getattr(obs, side)) for side in ("own", "foes")}
     for side, changes in (("own", own or {}), ("foes", foes or {})):
         for number, fields in changes.items():
             boats[side][number] = replace(boats[side][number], **fields)
-    return replace(sight, own=tuple(boats["own"]), foes=tuple(boats["foes"]), time=sight.time + time_s)
+    return replace(obs, own=tuple(boats["own"]), foes=tuple(boats["foes"]), time=obs.time + time_s)
 
 
-def begun(sight):
+def begun(obs):
     """A raid whose third boat has just been sent."""
-    raid = Raid(sight)
-    raid.advance(sight)
-    baited = moved(sight, 5.0, {0: {"x": 41.5}}, {2: {"x": 50.0, "y": 27.0}})
+    raid = Raid(obs)
+    raid.advance(obs)
+    baited = moved(obs, 5.0, {0: {"x": 41.5}}, {2: {"x": 50.0, "y": 27.0}})
     raid.advance(baited)
     dragged = moved(baited, 10.0, {0: {"tagged": True}, 1: {"x": 55.0, "on_side": False}}, {2: {"x": 55.0, "y": 12.0}})
     raid.advance(dragged)
     return raid, dragged
 
 
-def test_a_raid_goes_through_its_phases_and_ends_with_the_flag_home(sight):
-    raid = Raid(sight)
-    raid.advance(sight)
+def test_a_raid_goes_through_its_phases_and_ends_with_the_flag_home(obs):
+    raid = Raid(obs)
+    raid.advance(obs)
     assert raid.phase == Phase.BAIT
-    raid, dragged = begun(sight)
+    raid, dragged = begun(obs)
     assert raid.phase == Phase.RUN
     assert raid.bait_taken
     raid.advance(moved(dragged, 10.0, {2: {"x": 60.0, "on_side": False, "carries": True}}))
@@ -71,8 +71,8 @@ def test_a_raid_goes_through_its_phases_and_ends_with_the_flag_home(sight):
 
 
 @pytest.mark.parametrize("lost", [{2: {"tagged": True}}, {1: {"tagged": True}}])
-def test_a_raid_is_given_up_when_a_boat_it_needs_is_tagged(sight, lost):
-    raid, dragged = begun(sight)
+def test_a_raid_is_given_up_when_a_boat_it_needs_is_tagged(obs, lost):
+    raid, dragged = begun(obs)
     raid.advance(moved(dragged, 1.0, lost))
     assert raid.phase == Phase.GATHER
 
@@ -97,9 +97,9 @@ CUT_OFF = {0: {"x": 55.0, "y": 12.0, "on_side": True}, 1: {"x": 50.0, "y": 6.0, 
 
 
 @pytest.mark.parametrize(("own", "foes"), [({}, {}), ({2: {"tagged": True}}, {}), ({}, CUT_OFF)])
-def test_once_every_opponent_has_come_the_third_boat_sails_alone_unless_tagged_or_cut_off(sight, own, foes):
+def test_once_every_opponent_has_come_the_third_boat_sails_alone_unless_tagged_or_cut_off(obs, own, foes):
     """It waits at the other edge until then."""
-    here = moved(sight, 0.0, {2: {"x": 38.0, "y": 6.0}}, {n: {"on_side": False, **at} for n, at in ALL_HERE.items()})
+    here = moved(obs, 0.0, {2: {"x": 38.0, "y": 6.0}}, {n: {"on_side": False, **at} for n, at in ALL_HERE.items()})
     raid = Raid(here)
     raid.advance(here)
     assert (raid.unguarded, raid.phase, raid.upper) == (True, Phase.RUN, False)
@@ -133,20 +133,20 @@ def circling(time_s):
     return {"x": 60.0 + 5.0 * math.cos(angle), "y": 20.0 - 5.0 * math.sin(angle), "heading": angle + math.pi}
 
 
-def watched(sight, seconds, place=circling, begin_s=0, habits=None):
+def watched(obs, seconds, place=circling, begin_s=0, habits=None):
     """Habits of opponents of which the third does as it is told."""
     habits = habits or Habits(3)
     for second in range(begin_s, begin_s + seconds):
-        assert habits.look(moved(sight, float(second), foes={2: {"on_side": True, "tagged": False, **place(second)}}))
+        assert habits.look(moved(obs, float(second), foes={2: {"on_side": True, "tagged": False, **place(second)}}))
     return habits
 
 
-def test_who_circles_is_expected_to_go_on_circling_after_the_first_round_looked_at_once_a_second(sight):
-    habits = watched(sight, int(ROUND_S) + LEAD)
-    assert not habits.look(moved(sight, ROUND_S + LEAD - 0.1))
+def test_who_circles_is_expected_to_go_on_circling_after_the_first_round_looked_at_once_a_second(obs):
+    habits = watched(obs, int(ROUND_S) + LEAD)
+    assert not habits.look(moved(obs, ROUND_S + LEAD - 0.1))
     assert not habits.settled(2)
     assert habits.track(2, 10) is None
-    habits = watched(sight, 60)
+    habits = watched(obs, 60)
     assert habits.settled(2)
     track = habits.track(2, 70)
     expected = [(circling(60 + k)["x"], circling(60 + k)["y"]) for k in range(70)]
@@ -154,13 +154,13 @@ def test_who_circles_is_expected_to_go_on_circling_after_the_first_round_looked_
     assert track[:, 2].all()
 
 
-def test_who_leaves_its_circle_is_not_relied_on_for_long(sight):
-    habits = watched(sight, 60)
-    watched(sight, 5, lambda second: {"x": 60.0 - 2.0 * (second - 60), "y": 20.0, "heading": 0.0}, 60, habits)
+def test_who_leaves_its_circle_is_not_relied_on_for_long(obs):
+    habits = watched(obs, 60)
+    watched(obs, 5, lambda second: {"x": 60.0 - 2.0 * (second - 60), "y": 20.0, "heading": 0.0}, 60, habits)
     assert not habits.settled(2)
-    watched(sight, 4 * WARY, begin_s=65, habits=habits)
+    watched(obs, 4 * WARY, begin_s=65, habits=habits)
     assert not habits.settled(2)
-    watched(sight, 12 * WARY, begin_s=65 + 4 * WARY, habits=habits)
+    watched(obs, 12 * WARY, begin_s=65 + 4 * WARY, habits=habits)
     assert habits.settled(2)
 
 
@@ -196,9 +196,9 @@ def test_a_way_leads_round_who_stands_and_to_the_flag(apart):
     assert math.dist(found.points[-1], apart.goal) < apart.reach
 
 
-def raid_with(sight, tracks):
+def raid_with(obs, tracks):
     """A raid in which opponents with tracks keep a habit, and the others have left."""
-    raid = Raid(sight)
+    raid = Raid(obs)
     raid.watch.habits.settled = lambda number: number in tracks
     raid.watch.habits.track = lambda number, looks: tracks.get(number)
     raid.watch._left = {0, 1, 2} - set(tracks)

@@ -42,7 +42,7 @@ class Boat:
 
 
 @dataclass(frozen=True)
-class Sight:
+class Observation:
     """One moment of a game.
 
     Attributes:
@@ -81,7 +81,7 @@ def is_turned(core: BatchedMctf, team: int) -> bool:
     return bool(core.flag_home[team, 0] > 0.5 * core.config.env_bounds_m[0])
 
 
-def look(core: BatchedMctf, team: int, game: int = 0) -> Sight:
+def look(core: BatchedMctf, team: int, game: int = 0) -> Observation:
     """Return what a team sees of a game."""
     turned, (width, height) = is_turned(core, team), core.config.env_bounds_m
 
@@ -92,7 +92,7 @@ def look(core: BatchedMctf, team: int, game: int = 0) -> Sight:
     size = core.config.team_size
     sides = tuple(boats[:size]), tuple(boats[size:])
     homes, flags = core.flag_home.tolist(), core.flag_position[game].tolist()
-    return Sight(
+    return Observation(
         own=sides[team],
         foes=sides[1 - team],
         size=(width, height),
