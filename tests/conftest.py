@@ -8,8 +8,12 @@ import time
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, settings
 from steerclear.env.config import GameConfig
 from steerclear.env.record import find_breaches, make_record, meta_of
+
+settings.register_profile("shared_machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("shared_machine")  # how long an example takes says more of the machine than of the code
 
 REASONS = ["PASSED", "QP", "QP_RELAXED", "BACKUP", "BEST_EFFORT", "HELD", "NOT_COVERED", "RIGHT_OF_WAY"]
 
