@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -29,7 +30,7 @@ from .filter.blend import any_may_be_blended, blend, rescore_backups
 from .filter.groups import close_groups, make_groups, open_group
 from .filter.last_line import keep_last_line, note_last_resorts
 from .filter.nominal import check_nominal
-from .filter.program import Program, Solver
+from .filter.program import Solver, solve_with
 from .filter.qp import ROUNDS, accept, among_mates, begin_program, end_program, linearise, solve
 from .filter.right_of_way import forget_deadlock, note_deadlock
 from .jit import Array, BoolArray, copy_row, kernel, lean_kernel
@@ -42,6 +43,9 @@ from .workspace import Boats, Scene, Static, all_spent, new_scene, part_of, unch
 
 ROUNDING_S = 1e-9
 """Times this short are none: what is left of a sum of steps."""
+
+HOLD_OVER = -1.0
+"""Time left, s, of a hold that is over while the boat is still on its backup."""
 
 LEAST_TURN_DEG = 1e-3
 """Turns to go below this are made: what is remembered must not hang on the last bit of a heading."""
@@ -146,16 +150,16 @@ def _note_backup_hold(i: int, scene: Scene) -> None:
     """Note whether boat i is on its backup, and for how long it must stay on it.
 
     Without this hold, a boat at its required margin would switch between nominal command and backup in every step; a
-    boat that turns at once would weave.
+    boat that turns at once would weave. A backup that comes out as the nominal command holds nothing.
     """
     memory, reason = scene.memory[i], scene.reason[i]
     backing_up = reason in (W.BACKUP, W.BEST_EFFORT)
     left_s = 0.0
-    if backing_up:
-        left_s = (
-            memory[W.HOLD_S] if memory[W.BACKING_UP] > 0.0 else scene.boats.min_backup_hold_s[i]
-        ) - scene.tuning.dt_s
-    memory[W.HOLD_S] = left_s if left_s > ROUNDING_S else 0.0
+    if backing_up and not unchanged(i, scene):
+        begins = memory[W.BACKING_UP] == 0.0 or memory[W.HOLD_S] == 0.0
+        left_s = (scene.boats.min_backup_hold_s[i] if begins else memory[W.HOLD_S]) - scene.tuning.dt_s
+        left_s = left_s if left_s > ROUNDING_S else HOLD_OVER
+    memory[W.HOLD_S] = left_s
     memory[W.BACKING_UP] = 1.0 if backing_up else 0.0
 
 
@@ -269,16 +273,20 @@ def end(scene: Scene) -> bool:
 
 
 @lean_kernel
-def decide_scene(scene: Scene) -> None:
-    """Make the whole decision: filtered commands go to ``scene.command``, reasons to ``scene.reason``."""
+def decide_scene(scene: Scene, solve_rows: Any) -> None:
+    """Make the whole decision: filtered commands go to ``scene.command``, reasons to ``scene.reason``.
+
+    ``solve_rows`` solves the QP of a number of boats and rows, as `qp.solve` does. Another solver than that runs this
+    same function in Python, see `Deciders.decide`.
+    """
     while True:
         for group in range(begin(scene)):
             count, safe = begin_group(group, scene), False
             for _ in range(ROUNDS if count > 0 else 0):
                 rows = linearise(count, scene)
-                if rows < 0 or not solve(count, rows, scene):
+                if rows < 0 or not solve_rows(count, rows, scene):
                     break
-                safe = accept(scene, scene.z, count)
+                safe = accept(count, scene)
                 if safe:
                     break
             end_group(scene, safe, count)
@@ -291,26 +299,8 @@ def decide_all(scene: Scene) -> None:
     """All decisions, one after another."""
     for b in range(scene.given.shape[0]):
         load_decision(b, scene)
-        decide_scene(scene)
+        decide_scene(scene, solve)
         store_decision(b, scene)
-
-
-def _decide_with(solver: Solver, scene: Scene) -> None:
-    """`decide_scene` with another solver of its programs."""
-    while True:
-        for group in range(begin(scene)):
-            count, safe = begin_group(group, scene), False
-            for _ in range(ROUNDS if count > 0 else 0):
-                rows, n = linearise(count, scene), 2 * count
-                z = solver(Program(scene.C[:rows, :n], scene.d[:rows], scene.z0[:n])) if rows >= 0 else None
-                if z is None:
-                    break
-                safe = accept(scene, z, count)
-                if safe:
-                    break
-            end_group(scene, safe, count)
-        if end(scene):
-            return
 
 
 class Deciders:
@@ -366,9 +356,10 @@ class Deciders:
         """Write into the scene what is decided about what is given, beside these static constraints."""
         self.beside(static)
         if self._solver is not None:
+            in_python, solve_rows = getattr(decide_scene, "py_func", decide_scene), partial(solve_with, self._solver)
             for b in range(len(self.scene.given)):
                 load_decision(b, self.scene)
-                _decide_with(self._solver, self.scene)
+                in_python(self.scene, solve_rows)
                 store_decision(b, self.scene)
             return
         if self._decide_all is None:

@@ -187,7 +187,6 @@ class Decisions:
         wanted_speed, wanted_heading = self.nominal.absolute(i, heading)
         sent_speed, sent_heading = self.filtered.absolute(i, heading)
         active = (names[bound],) if bound >= 0 else (FIELD,) if bound == STATIC else ()
-        margin = float(self.safety_margin_m[i])
         feared_s = math.nan if self.adversary_horizon_s is None else float(self.adversary_horizon_s[i])
         covered = reason != Reason.NOT_COVERED
         no_table = None if self.no_table is None else np.flatnonzero(self.no_table[i] & covered)
@@ -200,7 +199,7 @@ class Decisions:
             intervened=bool(self.intervened[i]),
             reason=reason,
             active_constraints=(self.barriers[STATIC - 1 - bound],) if bound < STATIC else active,
-            safety_margin_m=margin if margin < 1e5 else math.inf,
+            safety_margin_m=float(self.safety_margin_m[i]),
             slack_m=float(self.slack_m[i]),
             fallback=FALLBACKS.get(reason),
             solve_time_s=self.solve_time_s,

@@ -90,8 +90,6 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
     kinds, dt_s = tuple(get_platform(name) for name in platforms), config.model_s
     limits = [limits_of(kind, dt_s) for kind in kinds]
     opponent_model = OPPONENT_MODELS[config.opponent_model]
-    pursuers = config.effective_adversary_horizon_s > 0.0
-    granted = 1.0 if pursuers else 0.0
     stride = max(1, min((_stride(kind, limit, dt_s) for kind, limit in zip(kinds, limits, strict=True)), default=1))
     tables, table, steps = _tables_of(config, kinds, team)
     with_table = np.asarray((table >= 0).any(axis=1))
@@ -106,11 +104,7 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
             params=np.column_stack([params, *extra]),
             team=np.array(team, dtype=np.int64),
             fastest_mps=np.array([kind.fastest_mps(dt_s) for kind in kinds]),
-            granted_turn_dps=np.array([granted * limit.turn_rate_dps for limit in limits]),
-            granted_acc_mps2=np.array([limit.acceleration_mps2 if pursuers else 0.0 for limit in limits]),
             regain_s=np.array([limit.regain_s for limit in limits]),
-            granted_dec_mps2=np.array([limit.turn_deceleration_mps2 for limit in limits]),
-            granted_loss=np.array([granted * _lasting_loss(limit) for limit in limits]),
             ready_thrust=np.where(with_table, FULL_THRUST * params[:, L.MAX_THRUST], ENOUGH_THRUST * steady),
             stride=stride,
             sample_s=stride * dt_s,
@@ -126,9 +120,22 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
             joint_decay=decay,
             joint_samples=math.ceil(max(steps, round(JOINT_RUN_S / dt_s)) / stride),
             has_table=np.asarray((table >= 0).any(axis=0)),
+            **_as_opponents(config, limits),
             **_horizons(config, kinds, limits, team, stride * dt_s),
         )
     )
+
+
+def _as_opponents(config: ShieldConfig, limits: list[Limits]) -> dict[str, Any]:
+    """Return what is granted to each boat as an opponent."""
+    pursuers = config.effective_adversary_horizon_s > 0.0
+    granted = 1.0 if pursuers else 0.0
+    return {
+        "granted_turn_dps": np.array([granted * limit.turn_rate_dps for limit in limits]),
+        "granted_acc_mps2": np.array([limit.acceleration_mps2 if pursuers else 0.0 for limit in limits]),
+        "granted_dec_mps2": np.array([limit.turn_deceleration_mps2 for limit in limits]),
+        "granted_loss": np.array([granted * _lasting_loss(limit) for limit in limits]),
+    }
 
 
 @lru_cache(maxsize=256)

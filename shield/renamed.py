@@ -6,7 +6,7 @@ import functools
 import logging
 import warnings
 from collections.abc import Callable, Mapping
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 SETTINGS = {
     "adversary_s": "adversary_horizon_s",
@@ -47,6 +47,7 @@ DECISIONS = {
 """Fields of `Fleet`, `Decision` and `Decisions`."""
 
 T = TypeVar("T", bound=type)
+F = TypeVar("F", bound=Callable[..., Any])
 LOG = logging.getLogger(__name__)
 
 
@@ -73,6 +74,23 @@ def warn(old: str, new: str, stacklevel: int = 3) -> None:
     warnings.warn(text, DeprecationWarning, stacklevel=stacklevel + 1)
 
 
+def takes_old_keywords(keywords: Mapping[str, str]) -> Callable[[F], F]:
+    """Let a function be called with the old names of some keywords, old name to new; each use warns."""
+
+    def renaming(function: F) -> F:
+        @functools.wraps(function)
+        def called(*args: Any, **given: Any) -> Any:
+            if not keywords.keys().isdisjoint(given):  # rare, and decisions are made by the thousand
+                for old in [name for name in given if name in keywords]:
+                    warn(old, keywords[old])
+                    given[keywords[old]] = given.pop(old)
+            return function(*args, **given)
+
+        return cast(F, called)
+
+    return renaming
+
+
 def accepts_old_names(keywords: Mapping[str, str], attributes: Mapping[str, str] | None = None) -> Callable[[T], T]:
     """Let a class be built with, and read by, its old names as well; each use warns.
 
@@ -80,18 +98,7 @@ def accepts_old_names(keywords: Mapping[str, str], attributes: Mapping[str, str]
         keywords: keywords of its constructor, and of its classmethod ``of`` if it has one, old name to new.
         attributes: other attributes with an old name.
     """
-    readable = {**keywords, **(attributes or {})}
-
-    def renaming(build: Callable[..., Any]) -> Callable[..., Any]:
-        @functools.wraps(build)
-        def called(*args: Any, **given: Any) -> Any:
-            if not keywords.keys().isdisjoint(given):  # rare, and decisions are made by the thousand
-                for old in [name for name in given if name in keywords]:
-                    warn(old, keywords[old])
-                    given[keywords[old]] = given.pop(old)
-            return build(*args, **given)
-
-        return called
+    readable, renaming = {**keywords, **(attributes or {})}, takes_old_keywords(keywords)
 
     def read(self: Any, name: str) -> Any:
         if name not in readable:

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from copy import deepcopy
 from functools import lru_cache
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from .jit import Array, BoolArray, IntArray, copy_row, kernel
 from .masks import passing
 from .model import boats_of, missing_tables
 from .platforms import layout as L
-from .renamed import warn
+from .renamed import takes_old_keywords
 from .surroundings import OPEN_WATER, Surroundings, off_m
 from .tracks import carry_over, steps_of_delay, who_stayed
 from .workspace import Scene, Static
@@ -144,14 +144,8 @@ class Shield:
             fleet.check()
             twin._deciders_of(fleet, twin._static(OPEN_WATER))
 
-    def decide(
-        self,
-        fleet: Fleet,
-        nominal: Commands | None = None,
-        surroundings: Surroundings | None = None,
-        *,
-        wanted: Commands | None = None,
-    ) -> Decisions:
+    @takes_old_keywords({"wanted": "nominal"})
+    def decide(self, fleet: Fleet, nominal: Commands, surroundings: Surroundings | None = None) -> Decisions:
         """Decide for all controlled boats of a fleet.
 
         Manoeuvres are found one boat at a time, in the order of names. So the same boats get the same commands, bit
@@ -162,7 +156,6 @@ class Shield:
             nominal: the nominal commands, n rows; rows of boats not controlled are passed through. Speeds beyond a
                 platform's range are cut first (not those of `Commands.game_deg`).
             surroundings: static constraints now, if they differ from those given at construction.
-            wanted: earlier name of ``nominal``; it warns, and goes with the next release.
 
         Returns:
             One decision per boat, in the fleet's order.
@@ -173,50 +166,50 @@ class Shield:
             ConfigError: the surroundings are of another kind or leave nothing of the field.
         """
         started = time.perf_counter()
-        if wanted is not None:
-            warn("wanted", "nominal")
-            nominal = wanted
-        nominal = cast(Commands, nominal)  # `_check` refuses anything else
         around = self.surroundings if surroundings is None else surroundings
         _check(fleet, nominal, self.config)
         static = self._static(around)
         deciders = self._deciders_of(fleet, static)
         order, place = order_of(fleet.names)
-        params, pending = deciders.scene.boats.params, deciders.scene.pending
         within, cut = nominal.within(fleet.names, fleet.controlled, self._highest_mps)
         state, unknown = self._with_memory(fleet, order)
-        works = pending[0, 0].copy() if pending.size > 0 else None
+        pending = deciders.scene.pending[:1, :1].copy()  # the commands in effect in this step, if they come late
         self._give(deciders.scene.given, fleet, fleet.state if unknown is None else state[place], within, order)
         self._barriers.renew()
         deciders.decide(self._keep_from(static, deciders.scene))
         self._barriers.tell()
-        sent, changed, reason, reported = self._decided(deciders.scene)
-        sent, changed, reason, reported = sent[place], changed[place], reason[place], reported[place]
+        sent, changed, reason, reported = (values[place] for values in self._decided(deciders.scene))
         commands = within.replaced(changed, sent, fleet.state[:, L.HEADING]) if changed.any() else within
         if cut is not None:
             reason[cut & (reason == W.PASSED)] = W.LIMITED
             changed |= cut
         if self._autopilots is not None and unknown is not None:
-            sent_now = commands.as_relative_deg(fleet.state[:, L.HEADING])[order]
-            works = sent_now if works is None else to_turn(works, state)
-            self._autopilots.go_on(unknown, params, works, self.config.dt_s)
+            at_once = commands.as_relative_deg(fleet.state[:, L.HEADING])[order]
+            in_effect = to_turn(pending[0, 0], state) if pending.size else at_once
+            self._autopilots.go_on(unknown, deciders.scene.boats.params, in_effect, self.config.dt_s)
         return Decisions.made(
             fleet=fleet,
             nominal=nominal,
             filtered=commands,
             intervened=changed,
             reason=reason,
-            safety_margin_m=reported[:, W.MARGIN_M],
-            slack_m=reported[:, W.SLACK_M],
-            bound=self._bound[reported[:, W.ACTIVE].astype(np.int64)],
             solve_time_s=time.perf_counter() - started,
             no_table=self._missing,
-            cut_short=reported[:, W.CUT_SHORT] != 0.0,
-            adversary_horizon_s=reported[:, W.ADVERSARY_HORIZON_S],
-            solver=reported[:, W.SOLVER].astype(np.int64),
             barriers=self.config.barriers,
             area=around.field,
+            **self._as_fields(reported),
         )
+
+    def _as_fields(self, reported: Array) -> dict[str, Any]:
+        """Return what compiled code reports, (n, N_REPORTED), as fields of `Decisions`."""
+        return {
+            "safety_margin_m": reported[:, W.MARGIN_M],
+            "slack_m": reported[:, W.SLACK_M],
+            "bound": self._bound[reported[:, W.ACTIVE].astype(np.int64)],
+            "cut_short": reported[:, W.CUT_SHORT] != 0.0,
+            "adversary_horizon_s": reported[:, W.ADVERSARY_HORIZON_S],
+            "solver": reported[:, W.SOLVER].astype(np.int64),
+        }
 
     @property
     def remembered(self) -> dict[str, Array]:

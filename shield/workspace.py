@@ -44,10 +44,10 @@ HAS_BACKUP, BACKUP_SIDE, BACKUP_HEADING, BACKUP_SPEED, BACKUP_MARGIN, JOINT_MARG
 left), and speed, m/s; verified margins, m: from all boats, from several opponents rolled out, from static constraints.
 """
 BACKING_UP, HOLD_S, DEADLOCK_S, DEADLOCK_DEG, FREE_S, BLOCKED_BY, GIVES_WAY, N_MEMORY = range(7, 15)
-"""Whether the backup was carried out, and for how long it still is whatever the nominal command, s. Then, of
-`right_of_way`: for how long a teammate has kept the boat from turning, s; its heading when that began, deg; time since
-it last happened, s; the teammate (-1: none); the side to which the boat gives way (0: it does not). From ``N_MEMORY``
-on: the margin from each boat as an opponent, m."""
+"""Whether the backup was carried out, and for how long it still is whatever the nominal command, s (below 0: no more).
+Then, of `right_of_way`: for how long a teammate has kept the boat from turning, s; its heading when that began, deg;
+time since it last happened, s; the teammate (-1: none); the side to which the boat gives way (0: it does not). From
+``N_MEMORY`` on: the margin from each boat as an opponent, m."""
 
 
 RUN_X, RUN_Y, RUN_EAST, RUN_NORTH, RUN_SPEED, RUN_TO_X, RUN_TO_Y, RUN_WORST, RUN_WEIGHT, N_RUN = range(10)
@@ -229,6 +229,7 @@ class Scene(NamedTuple):
     searched: Annotated[IntArray, "n"]  # changes of manoeuvres at the last search for a boat, -1: never
     # scratch
     row: Annotated[Array, L.N_STATE]
+    stop_row: Annotated[Array, L.N_STATE]
     out: Annotated[Array, 4]
     scratch_clear: Annotated[Array, 4]
     ways: Annotated[Array, "n", 3, 5]  # places at which an opponent may be when tables are looked up
@@ -248,7 +249,6 @@ class Scene(NamedTuple):
     C: Annotated[Array, "rows", "2n"]
     d: Annotated[Array, "rows"]
     dual: Annotated[Array, "rows"]
-    label: Annotated[IntArray, "rows", 2]
 
 
 MOST_ROWS = 3000

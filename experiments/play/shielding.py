@@ -22,8 +22,6 @@ from ..oracle import AT_ONCE, Motion
 from .conditions import Disturbances
 from .spec import SIDES, MatchSpec
 
-NOBODY_NEAR_M = 1e5
-"""Margins beyond this say that nobody is near; there is no certificate to show."""
 Listener = Callable[[Array, Array], None]
 """Called before the boats move with the commands (1, n, 2) wanted and those sent."""
 
@@ -108,7 +106,7 @@ class Shielding:
                 own = decisions.reason != NOT_COVERED
                 reason[own], intervened[own] = decisions.reason[own], decisions.intervened[own]
                 margin_m = decisions.safety_margin_m[own]
-                margins_m[own] = np.where(margin_m < NOBODY_NEAR_M, margin_m, np.nan)
+                margins_m[own] = np.where(np.isfinite(margin_m), margin_m, np.nan)
                 times_s.append(decisions.solve_time_s)
         return Seen(reason, intervened, margins_m, max(times_s, default=None))
 

@@ -91,12 +91,20 @@ class AtThrust(NamedTuple):
     turning_mps: float
 
 
+class HalfTurn(NamedTuple):
+    """A turn, deg, and cosine and sine of its half, in the direction of the manoeuvre."""
+
+    turn_deg: float
+    cosine: float
+    sine: float
+
+
 class Settling(NamedTuple):
     """How speed and thrust settle on a straight run: their shortfalls shrink in each step.
 
     Attributes:
         speed_mps: speed at which the run settles, m/s.
-        short_mps: present shortfall from it, m/s.
+        short_mps: present shortfall from it, m/s; NaN: it does not settle yet.
         thrust: thrust at which the run settles, percent.
         short_thrust: present shortfall from it, percent.
         rate: share of both shortfalls that is left after a step.
@@ -135,22 +143,18 @@ def sail(params: Array, row: Array, side: float, togo_deg: float, speed_mps: flo
 
 
 @lean_kernel
-def _is_ready(k: int, span: Span, thrust: float, ready: Array) -> bool:
-    """Return whether sample k is the first, from the earliest that counts, at which thrust is full."""
-    return ready[READY_SAMPLE] < 0.0 and k >= span.earliest and thrust >= span.ready_thrust
-
-
-@lean_kernel
-def _note_ready(k: int, ux: float, uy: float, speed_mps: float, ready: Array) -> None:
-    """Note that thrust is full at sample k, with heading and speed there."""
-    ready[READY_SAMPLE], ready[READY_HEADING], ready[READY_SPEED] = k, math.atan2(ux, uy), speed_mps
+def _note_sample(k: int, at: Straight, speed_mps: float, thrust: float, span: Span, path: Array, ready: Array) -> None:
+    """Write sample k; note if it is the first, from the earliest that counts, at which thrust is full."""
+    path[k, 0], path[k, 1] = at.x, at.y
+    if ready[READY_SAMPLE] < 0.0 and k >= span.earliest and thrust >= span.ready_thrust:
+        ready[READY_SAMPLE], ready[READY_HEADING], ready[READY_SPEED] = k, math.atan2(at.ux, at.uy), speed_mps
 
 
 @lean_kernel
 def _note_state(k: int, span: Span, row: Array, path: Array, ready: Array) -> None:
     """Write sample k from a state."""
     path[k, 0], path[k, 1] = row[L.X], row[L.Y]
-    if _is_ready(k, span, row[L.THRUST], ready):
+    if ready[READY_SAMPLE] < 0.0 and k >= span.earliest and row[L.THRUST] >= span.ready_thrust:
         ready[READY_SAMPLE], ready[READY_SPEED] = k, row[L.SPEED]
         ready[READY_HEADING] = math.radians(row[L.HEADING])
 
@@ -228,19 +232,12 @@ def _trace_usv(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path
     `sail` alone, decisions take 1.4 times as long (42 scenes of 50 decisions), and differ by rounding.
     """
     side, togo_deg, speed_mps, dt_s = manoeuvre.side, manoeuvre.togo_deg, manoeuvre.speed_mps, span.dt_s
-    x, y, v = row[L.X], row[L.Y], row[L.SPEED]
+    x, y, v, heading = row[L.X], row[L.Y], row[L.SPEED], math.radians(row[L.HEADING])
     thrust, error, integral = row[L.THRUST], row[L.SPEED_ERROR], row[L.SPEED_INTEGRAL]
-    heading = math.radians(row[L.HEADING])
-    ux, uy = math.sin(heading), math.cos(heading)
-    most = held_rudder(params) * abs(side)
-    sign = math.copysign(1.0, side)
-    top = params[L.MAX_SPEED]
-    half, c, s = 0.0, 1.0, 0.0
-    at = AtThrust(math.nan, 0.0, 0.0, 0.0)
-    gained, before, earlier = 0.0, 0.0, 0.0
-    k, step = 0, -1
-    if span.done > 0:
-        k, step = _note_done(span.done, span, row, path, ready)
+    ux, uy, top = math.sin(heading), math.cos(heading), params[L.MAX_SPEED]
+    most, sign = held_rudder(params) * abs(side), math.copysign(1.0, side)
+    at, half, gains = AtThrust(math.nan, 0.0, 0.0, 0.0), HalfTurn(0.0, 1.0, 0.0), (0.0, 0.0, 0.0)
+    k, step = _note_done(span.done, span, row, path, ready) if span.done > 0 else (0, -1)
     while k <= _last_sample(span, ready):
         last = thrust
         thrust, error, integral = next_thrust(params, v, thrust, error, integral, speed_mps, dt_s)
@@ -248,35 +245,41 @@ def _trace_usv(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path
             at = _at_thrust(params, thrust, most, dt_s)
         turn, aim_mps = _turn_of_step(at, togo_deg, most, params)
         new_speed = speed_towards(params, v, aim_mps, dt_s)
-        if new_speed == 0.0:
-            turn = 0.0
-        mean = 0.5 * (new_speed + v)
+        turn, mean, mx, my = turn if new_speed != 0.0 else 0.0, 0.5 * (new_speed + v), ux, uy
         if turn > 0.0:
             togo_deg = togo_deg - turn if togo_deg - turn > 1e-9 else 0.0
-            if turn != half:
-                angle = math.radians(0.5 * turn) * sign
-                half, c, s = turn, math.cos(angle), math.sin(angle)
-            mx, my = ux * c + uy * s, uy * c - ux * s
-            ux, uy = mx * c + my * s, my * c - mx * s
-        else:
-            mx, my = ux, uy
+            if turn != half.turn_deg:
+                half = _half_turn(turn, sign)
+            mx, my = _turned(ux, uy, half)
+            ux, uy = _turned(mx, my, half)
         x += mx * mean * dt_s
         y += my * mean * dt_s
-        earlier, before, gained = before, gained, mean - v
+        gains = mean - v, gains[0], gains[1]
         v = min(max(mean, 0.0), top)
         step += 1
         if step % span.stride != 0:
             continue
-        path[k, 0], path[k, 1] = x, y
-        if _is_ready(k, span, thrust, ready):
-            _note_ready(k, ux, uy, v, ready)
+        pose = Straight(x, y, ux, uy)
+        _note_sample(k, pose, v, thrust, span, path, ready)
         k += 1
         if togo_deg <= 0.0 and turn == 0.0:
-            commanded_mps = min(speed_mps, top)
-            end = _settling(v, commanded_mps, (gained, before, earlier), thrust, thrust - last)
-            if end.short_mps == 0.0 or _settles_at(commanded_mps, end, params):
-                _run_on(Straight(x, y, ux, uy), end, k, span, path, ready)
+            end = _settling(v, min(speed_mps, top), gains, thrust, thrust - last, params)
+            if end.short_mps >= 0.0:
+                _run_on(pose, end, k, span, path, ready)
                 return
+
+
+@lean_kernel
+def _half_turn(turn_deg: float, sign: float) -> HalfTurn:
+    """Return a turn with cosine and sine of its half."""
+    angle = math.radians(0.5 * turn_deg) * sign
+    return HalfTurn(turn_deg, math.cos(angle), math.sin(angle))
+
+
+@lean_kernel
+def _turned(ux: float, uy: float, half: HalfTurn) -> tuple[float, float]:
+    """Return a heading turned by half of a turn."""
+    return ux * half.cosine + uy * half.sine, uy * half.cosine - ux * half.sine
 
 
 @lean_kernel
@@ -290,27 +293,29 @@ def _share_left(gained: float, before: float, earlier: float) -> float:
 
 @lean_kernel
 def _settling(
-    speed_mps: float, commanded_mps: float, gains: tuple[float, float, float], thrust: float, more_thrust: float
+    speed_mps: float,
+    commanded_mps: float,
+    gains: tuple[float, float, float],
+    thrust: float,
+    more_thrust: float,
+    params: Array,
 ) -> Settling:
-    """Return how a straight run settles, by its last three gains, m/s, and its last thrust, percent; NaN: unknown."""
+    """Return how a straight run settles at the commanded speed, by its last three gains, m/s, and its last thrust."""
     gained, before, earlier = gains
     if abs(gained) + abs(more_thrust) < STEADY_SPEED:
         return Settling(speed_mps, 0.0, thrust, 0.0, 0.0, 0.0)
     evenly = more_thrust == 0.0 and gained > 0.0 and abs(gained - before) <= ALIKE * gained
     if evenly and speed_mps < commanded_mps:  # all that a boat accelerates by; at its top speed it is held back
-        return Settling(commanded_mps, commanded_mps - speed_mps, thrust, 0.0, 1.0, gained)
-    rate = _share_left(gained, before, earlier)
-    left = rate / (1.0 - rate) if 0.0 < rate < 1.0 else math.nan
-    return Settling(
-        speed_mps + gained * left, gained * left, thrust + more_thrust * left, more_thrust * left, rate, 0.0
-    )
-
-
-@lean_kernel
-def _settles_at(speed_mps: float, end: Settling, params: Array) -> bool:
-    """Return whether a run settles at that speed, with the thrust that holds it; else it only seems to settle."""
-    off_mps = max(abs(end.speed_mps - speed_mps), abs(speed_of_thrust(params, end.thrust) - speed_mps))
-    return end.short_mps > 0.0 and off_mps < SETTLED_MPS < speed_mps and end.thrust <= params[L.MAX_THRUST]
+        end = Settling(commanded_mps, commanded_mps - speed_mps, thrust, 0.0, 1.0, gained)
+    else:
+        rate = _share_left(gained, before, earlier)
+        left = rate / (1.0 - rate) if 0.0 < rate < 1.0 else math.nan
+        short_mps, short_thrust = gained * left, more_thrust * left
+        end = Settling(speed_mps + short_mps, short_mps, thrust + short_thrust, short_thrust, rate, 0.0)
+    off_mps = max(abs(end.speed_mps - commanded_mps), abs(speed_of_thrust(params, end.thrust) - commanded_mps))
+    if end.short_mps > 0.0 and off_mps < SETTLED_MPS < commanded_mps and end.thrust <= params[L.MAX_THRUST]:
+        return end
+    return Settling(math.nan, math.nan, math.nan, math.nan, 0.0, 0.0)  # else it only seems to settle
 
 
 @lean_kernel
@@ -332,8 +337,7 @@ def _run_on(run: Straight, end: Settling, k: int, span: Span, path: Array, ready
                 short_mps = max(0.5 * short_mps, short_mps - end.fall_mps)
                 way_m += (end.speed_mps - short_mps) * span.dt_s
         short_thrust *= left
-        path[k, 0], path[k, 1] = run.x + way_m * run.ux, run.y + way_m * run.uy
-        if _is_ready(k, span, end.thrust - short_thrust, ready):
-            _note_ready(k, run.ux, run.uy, end.speed_mps - short_mps, ready)
-            last = _last_sample(span, ready)
+        pose = Straight(run.x + way_m * run.ux, run.y + way_m * run.uy, run.ux, run.uy)
+        _note_sample(k, pose, end.speed_mps - short_mps, end.thrust - short_thrust, span, path, ready)
+        last = _last_sample(span, ready)
         k += 1

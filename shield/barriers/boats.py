@@ -26,7 +26,10 @@ ROUNDING_M = 1e-6
 
 @lean_kernel
 def reported_margin(i: int, scene: Scene) -> float:
-    """Return the safety margin of boat i as reported, m; inside the separation: minus its depth there now."""
+    """Return the safety margin of boat i as reported, m: infinite where nobody can meet it.
+
+    Inside the separation it is minus the boat's depth there now.
+    """
     state = scene.state
     least, in_breach = FAR, False
     for j in range(state.shape[0]):
@@ -34,7 +37,9 @@ def reported_margin(i: int, scene: Scene) -> float:
             in_breach = True
             gap = math.hypot(state[i, L.X] - state[j, L.X], state[i, L.Y] - state[j, L.Y])
             least = min(least, gap - scene.radius[i, j])
-    return least if in_breach else scene.clear[i, MARGIN]
+    if in_breach:
+        return least
+    return scene.clear[i, MARGIN] if scene.clear[i, MARGIN] < FAR else math.inf
 
 
 @lean_kernel

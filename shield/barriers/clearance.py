@@ -10,7 +10,7 @@ import math
 
 from ..jit import Array, lean_kernel
 
-MARGIN, SAMPLE, NORMAL_X, NORMAL_Y, N_CLEARANCE = range(5)
+MARGIN, SAMPLE, NORMAL_X, NORMAL_Y = range(4)
 
 FAR = 1e6
 """Margin, m, of a pair that cannot meet."""

@@ -24,7 +24,6 @@ from .static_obstacles import StaticObstacles
 from .tracker import Tracker
 
 LOG = logging.getLogger(__name__)
-NEAR_MARGIN_M = 1e5  # margins beyond this mean that nobody is near
 
 
 @dataclass(frozen=True)
@@ -178,7 +177,7 @@ def check_backup(fleet: FleetFile, tracker: Tracker, obstacles: StaticObstacles)
     nearest_m = float(np.hypot(*(others - given.position_m[worst]).T).min(initial=math.inf))
     near = ", ".join(answer[worst].active_constraints) or "the others"
     return found(
-        "nobody near" if margin > NEAR_MARGIN_M else f"least safety margin {margin:.2f} m ({name})",
+        "nobody near" if math.isinf(margin) else f"least safety margin {margin:.2f} m ({name})",
         {"safety_margin_m": margin, "nearest_m": nearest_m},
         (
             not margin >= 0.0,

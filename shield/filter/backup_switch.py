@@ -26,7 +26,7 @@ from ..barriers.boats import reported_margin
 from ..barriers.clearance import MARGIN
 from ..barriers.static import clear_of_near_obstacles
 from ..barriers.value_function import run_opponents
-from ..jit import lean_kernel
+from ..jit import Array, lean_kernel
 from ..platforms import layout as L
 from ..platforms.actuator import command_for_turn, full_turn
 from ..workspace import BACKUP, BEST_EFFORT, STOPPED, Scene
@@ -72,16 +72,23 @@ def slack_of(i: int, scene: Scene) -> float:
 
 
 @lean_kernel
+def first_command(i: int, row: Array, side: float, togo_deg: float, speed_mps: float, scene: Scene) -> float:
+    """Return the heading error, deg, that begins a manoeuvre of boat i from a state: its autopilot's inverse."""
+    params, dt_s = scene.boats.params[i], scene.tuning.dt_s
+    if togo_deg > 0.0:
+        togo_deg = min(togo_deg, abs(side) * full_turn(params, row, speed_mps, dt_s))
+    return command_for_turn(params, row, speed_mps, math.copysign(togo_deg, side), dt_s)
+
+
+@lean_kernel
 def command_backup(i: int, scene: Scene) -> None:
-    """Command the first step of boat i's backup, through the inverse of its autopilot."""
-    state, boats, tuning = scene.state, scene.boats, scene.tuning
-    side, togo, speed = scene.manoeuvre[i, 0], scene.manoeuvre[i, 1], scene.manoeuvre[i, 2]
-    scene.held[i, 0], scene.held[i, 1], scene.held[i, 2] = side, np.nan, speed
+    """Command the first step of boat i's backup."""
+    state, held, manoeuvre = scene.state[i], scene.held[i], scene.manoeuvre[i]
+    side, togo, speed = manoeuvre[0], manoeuvre[1], manoeuvre[2]
+    held[0], held[1], held[2] = side, np.nan, speed
     if togo > 0.0:
-        scene.held[i, 1] = state[i, L.HEADING] + math.copysign(togo, side)
-        togo = min(togo, abs(side) * full_turn(boats.params[i], state[i], speed, tuning.dt_s))
-    scene.command[i, 0] = speed
-    scene.command[i, 1] = command_for_turn(boats.params[i], state[i], speed, math.copysign(togo, side), tuning.dt_s)
+        held[1] = state[L.HEADING] + math.copysign(togo, side)
+    scene.command[i, 0], scene.command[i, 1] = speed, first_command(i, state, side, togo, speed, scene)
 
 
 @lean_kernel

@@ -2,17 +2,20 @@
 
 The operating area yields to boats, because a boat that turns back into a pursuer is hit; so a boat may be chased far
 out. Where the settings say "stop" (`ShieldConfig.beyond_then`), a boat beyond the hard line is stopped there, and no
-command leads it onto an obstacle. Behind every command lies a manoeuvre or a stop that stays clear of all obstacles
-until the boat is at rest. If a command has neither, the stop from now or the last manoeuvre still has one, by the same
-rule. Teammates are verified against a stop as against any command: a decision in which a boat turns out to have to stop
-is made again with that stop in it.
+command leads it onto an obstacle. Behind every command lies a stop, at once or at some time on a manoeuvre, that stays
+clear of all obstacles until the boat is at rest. If a command has none, the stop from now or the last manoeuvre still
+has one, by the same rule. Teammates are verified against a stop as against any command: a decision in which a boat
+turns out to have to stop is made again with that stop in it.
 """
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
+
 from ..backup.assign import refresh, score_all
-from ..backup.family import IN_MEMORY, candidate, remembered
-from ..backup.paths import sail
+from ..backup.family import IN_MEMORY, candidate, remembered, turn_left
 from ..backup.rollout import roll_out
 from ..backup.score import OPPONENTS
 from ..barriers.clearance import FAR
@@ -21,8 +24,9 @@ from ..barriers.static import STATIC, beyond_line
 from ..jit import Array, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..platforms.step import step_boat
+from ..platforms.usv import speed_of_thrust
 from ..workspace import BEST_EFFORT, GO_ON, HELD, MUST_STOP, NO_LAST_RESORT, STOPPED, Scene, Static
-from .backup_switch import command_backup, slack_of
+from .backup_switch import command_backup, first_command, slack_of
 from .nominal import predict
 
 AT_REST_MPS = 0.05
@@ -56,34 +60,54 @@ def _through(x: float, y: float, row: Array, static: Static) -> bool:
 
 
 @lean_kernel
-def _stays_clear(i: int, start: Array, side: float, togo_deg: float, speed_mps: float, scene: Scene) -> bool:
-    """Return whether boat i stays clear from a state on: on a manoeuvre for the horizon, then stopping.
+def _is_at_rest(row: Array, params: Array) -> bool:
+    """Return whether a boat lies still, and is not kept from its speed by the turn it makes."""
+    pushed_mps = speed_of_thrust(params, row[L.THRUST]) if params[L.KIND] == L.KIND_USV else 0.0
+    return max(row[L.SPEED], pushed_mps) < AT_REST_MPS
 
-    At speed 0 and without a turn it stops from the first step on. A boat that is too near already must not come nearer.
-    """
-    boats, static, row, dt_s = scene.boats, scene.static, scene.row, scene.tuning.model_s
-    params, x, y = boats.params[i], scene.state[i, L.X], scene.state[i, L.Y]
-    least = min(0.0, _room(x, y, static)) - ROUNDING_M
+
+@lean_kernel
+def _stop_stays_clear(i: int, start: Array, x: float, y: float, least_m: float, scene: Scene) -> bool:
+    """Return whether boat i, which came from (x, y), keeps room of ``least_m`` if it stops from a state on."""
+    boats, static, row, dt_s = scene.boats, scene.static, scene.stop_row, scene.tuning.model_s
     copy_row(row, start)
-    if _through(x, y, row, static):
-        return False
-    run = boats.samples[i] * boats.stride if speed_mps > 0.0 or togo_deg > 0.0 else 0
     skip = 0
-    for step in range(run + int(LONGEST_STOP_S / dt_s)):
-        x, y = row[L.X], row[L.Y]
-        if step < run:
-            togo_deg = sail(params, row, side, togo_deg, speed_mps, dt_s)
-        else:
-            step_boat(params, row, 0.0, 0.0, dt_s)
-        skip -= 1
+    for step in range(int(LONGEST_STOP_S / dt_s)):
         if skip <= 0:
             room = _room(row[L.X], row[L.Y], static)
-            if room < least or _through(x, y, row, static):
+            if room < least_m or _through(x, y, row, static):
                 return False
-            skip = int((room - least) / (max(boats.fastest_mps[i], row[L.SPEED]) * dt_s))
-        if step >= run and row[L.SPEED] < AT_REST_MPS:
+            skip = int((room - least_m) / (max(boats.fastest_mps[i], row[L.SPEED]) * dt_s))
+        if step > 0 and _is_at_rest(row, boats.params[i]):
             return True
+        x, y, skip = row[L.X], row[L.Y], skip - 1
+        step_boat(boats.params[i], row, 0.0, 0.0, dt_s)
     return True
+
+
+@lean_kernel
+def _stays_clear(i: int, start: Array, side: float, togo_deg: float, speed_mps: float, scene: Scene) -> bool:
+    """Return whether boat i stays clear from a state on if it stops at once, or at some time on a manoeuvre.
+
+    At any time: where a manoeuvre stays clear only if it is left in time, what is left of it after a step does so, too.
+    For the same reason the boat follows its commands here. A boat that is too near already must not come nearer.
+    """
+    tuning, static, row, params = scene.tuning, scene.static, scene.row, scene.boats.params[i]
+    x, y, end_deg = scene.state[i, L.X], scene.state[i, L.Y], np.nan
+    least_m = min(0.0, _room(x, y, static)) - ROUNDING_M
+    copy_row(row, start)
+    if togo_deg > 0.0:
+        end_deg = row[L.HEADING] + math.copysign(togo_deg, side)
+    for _ in range(scene.boats.samples[i] * scene.boats.stride // tuning.moves + 1):
+        if _stop_stays_clear(i, row, x, y, least_m, scene):
+            return True
+        error_deg = first_command(i, row, side, turn_left(row[L.HEADING], end_deg, side), speed_mps, scene)
+        for _ in range(tuning.moves):
+            if _room(row[L.X], row[L.Y], static) < least_m or _through(x, y, row, static):
+                return False
+            x, y = row[L.X], row[L.Y]
+            step_boat(params, row, speed_mps, error_deg, tuning.model_s)
+    return False
 
 
 @lean_kernel
@@ -98,9 +122,12 @@ def _stop(i: int, scene: Scene) -> None:
 
 @lean_kernel
 def _last_stays_clear(i: int, scene: Scene) -> bool:
-    """Return whether boat i remembers a manoeuvre that stays clear."""
+    """Return whether boat i must not stop at once, but remembers a manoeuvre that stays clear."""
     state = scene.state
-    if not remembered(i, 0, state[i, L.HEADING], scene):
+    x, y = state[i, L.X], state[i, L.Y]
+    least_m = min(0.0, _room(x, y, scene.static)) - ROUNDING_M
+    stops = _stop_stays_clear(i, state[i], x, y, least_m, scene)
+    if stops or not remembered(i, 0, state[i, L.HEADING], scene):
         return False
     side, togo, speed = candidate(i, IN_MEMORY, 0.0, state[i, L.HEADING], scene)
     return _stays_clear(i, state[i], side, togo, speed, scene)
@@ -128,12 +155,9 @@ def _last_resort(i: int, scene: Scene) -> int:
     if static.last_circles + static.last_segments == 0:
         return NO_LAST_RESORT
     side, togo, speed = scene.manoeuvre[i, 0], scene.manoeuvre[i, 1], scene.manoeuvre[i, 2]
-    if _stays_clear(i, scene.next_state[i], 1.0, 0.0, 0.0, scene) or _stays_clear(
-        i, scene.next_state[i], side, togo, speed, scene
-    ):
+    if _stays_clear(i, scene.next_state[i], side, togo, speed, scene):
         return NO_LAST_RESORT
-    stop = _stays_clear(i, scene.state[i], 1.0, 0.0, 0.0, scene) or not _last_stays_clear(i, scene)
-    return MUST_STOP if stop else GO_ON
+    return GO_ON if _last_stays_clear(i, scene) else MUST_STOP
 
 
 @lean_kernel

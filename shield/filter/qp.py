@@ -39,8 +39,6 @@ STATIC_AIM_M = 1e-3
 """Rows of static constraints aim this much beyond the target, so that the exact check does not fail by rounding."""
 SLOW_MPS = 0.3
 """Below this speed dh/dv is taken as at this speed."""
-NEAR_OBSTACLES, ALL_STATIC, LIMITS = -1, -2, -3
-"""What a row is about if not a boat: obstacles near in time, all static constraints, or limits of the inputs."""
 ROUNDS = 2
 """Rounds of linearising and solving before the backups are sent."""
 SAME = 1e-6
@@ -140,8 +138,8 @@ def _add_effect(r: int, i: int, m: int, sign: float, scene: Scene) -> None:
 
 
 @lean_kernel
-def _close_row(r: int, i: int, about_what: int, lack: float, count: int, scene: Scene) -> int:
-    """Set the right-hand side so that the row reads h + C (z - z_now) >= target; scale to unit length, and label it.
+def _close_row(r: int, lack: float, count: int, scene: Scene) -> int:
+    """Set the right-hand side so that the row reads h + C (z - z_now) >= target; scale to unit length.
 
     Returns the number of the next row: the same if no inputs can violate the row, or none affects it.
     """
@@ -157,7 +155,6 @@ def _close_row(r: int, i: int, about_what: int, lack: float, count: int, scene: 
     scene.d[r] /= norm
     for c in range(2 * count):
         row[c] /= norm
-    scene.label[r, 0], scene.label[r, 1] = i, about_what
     return r + 1
 
 
@@ -183,15 +180,15 @@ def _rows_of_boats(r: int, m: int, count: int, scene: Scene) -> int:
         kept_m = max(required_margin_m(i, j, scene), scene.verified[i, SCORE])
         if scene.ours[j] and satisfies_all(j, scene):
             kept_m = max(kept_m, scene.verified[j, SCORE])
-        r = _close_row(r, i, j, kept_m - scene.out[MARGIN], count, scene)
+        r = _close_row(r, kept_m - scene.out[MARGIN], count, scene)
     return r
 
 
 @lean_kernel
-def _row_of_static(r: int, m: int, about_what: int, count: int, scene: Scene) -> int:
+def _row_of_static(r: int, m: int, near_only: bool, count: int, scene: Scene) -> int:
     """Write mover m's row about obstacles near in time, or all static constraints; return the next row."""
     i, target_m = scene.movers[m], 0.0
-    if about_what == NEAR_OBSTACLES:
+    if near_only:
         nearest = clear_of_near_obstacles(i, i, scene, FAR, scene.out)
     else:
         nearest, target_m = clear_of_static(i, i, scene, scene.out), scene.static_target_m[i]
@@ -201,7 +198,7 @@ def _row_of_static(r: int, m: int, about_what: int, count: int, scene: Scene) ->
         return r
     scene.C[r, :] = 0.0
     _add_effect(r, i, m, 1.0, scene)
-    return _close_row(r, i, about_what, target_m + STATIC_AIM_M - scene.out[MARGIN], count, scene)
+    return _close_row(r, target_m + STATIC_AIM_M - scene.out[MARGIN], count, scene)
 
 
 @lean_kernel
@@ -212,17 +209,13 @@ def _rows_of_limits(r: int, m: int, scene: Scene) -> int:
         scene.C[r, :] = 0.0
         scene.C[r, 2 * m + side // 2] = 1.0 - 2.0 * (side % 2)
         scene.d[r] = lowest[side]
-        scene.label[r, 0], scene.label[r, 1] = scene.movers[m], LIMITS
         r += 1
     return r
 
 
 @lean_kernel
 def linearise(count: int, scene: Scene) -> int:
-    """Write the rows about the candidate; return how many, or -1: too many, or the work budget is used up.
-
-    ``scene.label[r]`` says whose row it is, and about which other boat, or about what else, see `LIMITS`.
-    """
+    """Write the rows about the candidate; return how many, or -1: too many, or the work budget is used up."""
     if all_spent(scene) or 6 * count > scene.C.shape[0]:  # two static rows and four of limits each
         return -1
     for m in range(count):
@@ -233,8 +226,8 @@ def linearise(count: int, scene: Scene) -> int:
         r = _rows_of_boats(r, m, count, scene)
         if r < 0:
             break
-        r = _row_of_static(r, m, NEAR_OBSTACLES, count, scene)
-        r = _row_of_static(r, m, ALL_STATIC, count, scene)
+        r = _row_of_static(r, m, True, count, scene)
+        r = _row_of_static(r, m, False, count, scene)
     for m in range(count if r >= 0 else 0):
         r = _rows_of_limits(r, m, scene)
     scene.spent[0] += ROW_COST * r * count
@@ -286,9 +279,9 @@ def begin_program(scene: Scene) -> int:
 
 
 @lean_kernel
-def _take_answer(z: Array, count: int, scene: Scene) -> bool:
+def _take_answer(count: int, scene: Scene) -> bool:
     """Turn scaled inputs (except unchanged ones) into commands that produce them; return False if any is not finite."""
-    root, dt_s = math.sqrt(scene.tuning.speed_weight), scene.tuning.dt_s
+    z, root, dt_s = scene.z, math.sqrt(scene.tuning.speed_weight), scene.tuning.dt_s
     for m in range(2 * count):
         if not math.isfinite(z[m]):
             return False
@@ -306,9 +299,9 @@ def _take_answer(z: Array, count: int, scene: Scene) -> bool:
 
 
 @lean_kernel
-def accept(scene: Scene, z: Array, count: int) -> bool:
-    """Take an answer of the QP; return whether it costs no boat more than a little by the exact check."""
-    if not _take_answer(z, count, scene):
+def accept(count: int, scene: Scene) -> bool:
+    """Take the answer of the QP; return whether it costs no boat more than a little by the exact check."""
+    if not _take_answer(count, scene):
         return False
     predict_and_score(scene)
     return keeps_backup_scores(LITTLE_M, scene)

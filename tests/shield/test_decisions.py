@@ -40,6 +40,16 @@ def test_the_margin_in_breach_is_how_far_inside_the_boats_are(gap_m, coordinatio
     assert batch.safety_margin_m[0, 0] == pytest.approx(gap_m - KEPT_M)
 
 
+def test_the_margin_of_a_boat_that_nobody_can_meet_is_infinite_everywhere():
+    fleet = Fleet.of(
+        position_m=[(0, 0), (900, 0)], heading_deg=[0, 0], speed_mps=[1, 1], team=[0, 1], platforms="heron"
+    )
+    decisions = Shield().decide(fleet, Commands.relative_deg([(1.0, 0.0)] * 2))
+    batch = BatchedShield(ShieldConfig(), 1, ("heron",) * 2, (0, 1))
+    batch.decide(np.nan_to_num(fleet.state[None]), np.array([[[1.0, 0.0]] * 2]), np.array([[True, False]]))
+    assert np.isinf([decisions.safety_margin_m[0], decisions[0].safety_margin_m, batch.safety_margin_m[0, 0]]).all()
+
+
 def test_a_decision_says_everything():
     decision = Shield().decide(head_on(5.5), AHEAD)[0]
     assert decision.reason in (Reason.LEAST_CHANGE, Reason.BACKUP)

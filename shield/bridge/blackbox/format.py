@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 from collections.abc import Mapping
 from typing import Any, get_args, get_origin, get_type_hints
 
@@ -131,6 +132,8 @@ COLUMNS: dict[str, tuple[type, str, type, tuple[int, ...]]] = {
     "solver": (Decisions, "solver", np.int64, ()),
 }
 """Values of a `BoatRecord` that are a row of an array: whose, its name there, its kind and shape."""
+NOBODY_NEAR_M = 1e6
+"""Margin in logs of 0.9.0 and before where nobody can come near; it is infinite."""
 _LATER = {"released", "released_by", "failsafe_over"}  # parts of a reading that 0.8.0 did not know
 _READING = {entry.name for entry in dataclasses.fields(BoatReading)} - _LATER
 
@@ -263,6 +266,7 @@ def _tick(record: TickRecord, platforms: Mapping[str, Platform]) -> Tick:
             area=None if around is None else around.field,
             **_arrays(rows, Decisions),
         )
+        decisions.safety_margin_m[decisions.safety_margin_m == NOBODY_NEAR_M] = math.inf
         for reason in decisions.reason:
             Reason(int(reason))
     same = ("number", "due_s", "began_s", "sent_s", "shield_reset", "policy_age_s")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from steerclear.shield.barriers.clearance import FAR, MARGIN, N_CLEARANCE, NORMAL_X, NORMAL_Y, SAMPLE
+from steerclear.shield.barriers.clearance import FAR, MARGIN, NORMAL_X, NORMAL_Y, SAMPLE
 from steerclear.shield.barriers.static import Sampling, clear_of_constraints
 from steerclear.shield.shared import share
 from steerclear.shield.workspace import Static, new_registered
@@ -24,7 +24,7 @@ def things(circles=NONE, walls=NO_WALL, obstacle_clearance_m=0.0, side_m=0.0, fi
 
 def clear_of(near_only, path, static, here=None, near=None, side=None, drift_m=0.0, grace=1.0):
     """Clearance row of a path sampled every 0.5 s, on which a boat goes 1 m from sample to sample."""
-    out, last = np.full(N_CLEARANCE, FAR), len(path) - 1
+    out, last = np.full(4, FAR), len(path) - 1
     here, near = path[0] if here is None else np.asarray(here), last if near is None else near
     side = last if side is None else side
     sampling = Sampling(near, side, last, 0.1, 0.5, 1.0, drift_m, grace)

@@ -20,15 +20,19 @@ LOG = logging.getLogger(__name__)
 KEPT_M, GAMES = 2.5, 100
 
 
-def played(preset, opponent, games, longest=np.inf, own="medium"):
+UNLIKE = {"aamas2024": ("heron", "heron", "surveyor") * 2, "mctf2025": ("surveyor", "surveyor", "heron") * 2}
+"""Teams of unlike boats, for each preset."""
+
+
+def played(preset, opponent, games, longest=np.inf, own="medium", **settings):
     """(games, 5): entries of teammates and of opponents, captures for and against, share of commands changed."""
-    core = BatchedMctf(GameConfig.preset(preset, default_start=False), games, 0)
+    core = BatchedMctf(GameConfig.preset(preset, default_start=False, **settings), games, 0)
     core.reset(seed=0)
     teams = [policies.make_batch(own), policies.make_batch(opponent)]
     for number, team in enumerate(teams):
         team.reset(core, number, number)
-    settings = {**facts_of_games(core).settings(), "separation_m": KEPT_M}
-    shield = games_shield(core, ShieldConfig.of(**settings), team="blue")
+    config = ShieldConfig.of(**{**facts_of_games(core).settings(), "separation_m": KEPT_M})
+    shield = games_shield(core, config, team="blue")
     decide, ours = shield.filter_for(0), core.team == 0
     going, commands = np.ones(games, bool), np.zeros((games, core.n_boats, 2))
     counts, asked, was_inside, steps = np.zeros((games, 5)), np.zeros(games), None, 0
@@ -93,6 +97,16 @@ def test_games_by_the_hundred(preset):
     LOG.warning("%s: entries of teammates and opponents %s, means %s", preset, entries, counts.mean(0).round(4))
     assert entries[0] <= 3
     assert entries[1] <= 11
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("preset", UNLIKE)
+def test_games_of_unlike_boats_by_the_hundred(preset):
+    teams = [played(preset, opponent, GAMES, platforms=UNLIKE[preset]) for opponent in ("easy", "medium", "hidden")]
+    counts = np.concatenate(teams)
+    entries = counts[:, :2].sum(0)
+    LOG.warning("%s, unlike: entries of teammates and opponents %s, means %s", preset, entries, counts.mean(0).round(4))
+    assert entries[0] <= 3
 
 
 @pytest.mark.study

@@ -86,7 +86,7 @@ def decided(draw, fleet, wanted):
         filtered=wanted if draw(st.booleans()) else Commands(draw(arrays(n, 2)), draw(st.booleans())),
         intervened=draw(arrays(n, of=st.booleans(), dtype=np.bool_)),
         reason=draw(arrays(n, of=st.integers(0, 6), dtype=np.int64)),
-        safety_margin_m=draw(arrays(n)),
+        safety_margin_m=draw(arrays(n, of=floats.filter(lambda margin_m: margin_m != 1e6))),
         slack_m=draw(arrays(n)),
         bound=draw(arrays(n, of=st.integers(-2, n - 1), dtype=np.int64)),
         solve_time_s=draw(floats),
@@ -135,6 +135,15 @@ def test_any_tick_is_valid_and_comes_back_bit_for_bit(tick):
     message = json.loads(json.dumps(tick_to_json(tick, HERON), allow_nan=False))
     jsonschema.Draft7Validator(TICK).validate(message)
     assert same(tick, tick_from_json(message, HERON))
+
+
+@quick
+@given(ticks().filter(lambda tick: tick.decisions is not None))
+def test_a_margin_of_an_old_log_where_nobody_is_near_is_infinite(tick):
+    message = tick_to_json(tick, HERON)
+    message["boats"][0]["certificate_m"] = 1e6
+    message["odd"] = [entry for entry in message["odd"] if entry["at"] != "boats.0.certificate_m"]
+    assert tick_from_json(message, HERON).decisions[0].safety_margin_m == math.inf
 
 
 def odd_tick(number, tick):
