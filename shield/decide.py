@@ -30,7 +30,7 @@ from .filter.blend import any_may_be_blended, blend, rescore_backups
 from .filter.groups import close_groups, make_groups, open_group
 from .filter.last_line import keep_last_line, note_last_resorts
 from .filter.nominal import check_nominal
-from .filter.program import Solver, solve_with
+from .filter.program import Program, Solver
 from .filter.qp import ROUNDS, accept, among_mates, begin_program, end_program, linearise, solve
 from .filter.right_of_way import forget_deadlock, note_deadlock
 from .jit import Array, BoolArray, copy_row, kernel, lean_kernel
@@ -303,6 +303,15 @@ def decide_all(scene: Scene) -> None:
         store_decision(b, scene)
 
 
+def _solve_by(solver: Solver, count: int, rows: int, scene: Scene) -> bool:
+    """Solve the QP of so many boats and rows by another solver, as `qp.solve` does; return whether there is one."""
+    n = 2 * count
+    z = solver(Program(scene.C[:rows, :n], scene.d[:rows], scene.z0[:n]))
+    if z is not None:
+        scene.z[:n] = z
+    return z is not None
+
+
 class Deciders:
     """B deciders of the same fleet; what is given, decided and remembered are arrays of ``scene``.
 
@@ -356,7 +365,7 @@ class Deciders:
         """Write into the scene what is decided about what is given, beside these static constraints."""
         self.beside(static)
         if self._solver is not None:
-            in_python, solve_rows = getattr(decide_scene, "py_func", decide_scene), partial(solve_with, self._solver)
+            in_python, solve_rows = getattr(decide_scene, "py_func", decide_scene), partial(_solve_by, self._solver)
             for b in range(len(self.scene.given)):
                 load_decision(b, self.scene)
                 in_python(self.scene, solve_rows)

@@ -18,7 +18,6 @@ import numpy as np
 
 from ..exceptions import SolverError
 from ..jit import Array
-from ..workspace import Scene
 
 logger = logging.getLogger(__name__)
 
@@ -100,12 +99,3 @@ def solve(program: Program, solver: str) -> Array | None:
     if not isinstance(answer, np.ndarray) or answer.shape != program.z0.shape or answer.dtype != np.float64:
         return None
     return answer if program.holds(answer) else None
-
-
-def solve_with(solver: Solver, count: int, rows: int, scene: Scene) -> bool:
-    """Solve the QP of so many boats and rows that is in a scene, as `qp.solve` does; return whether there is one."""
-    n = 2 * count
-    z = solver(Program(scene.C[:rows, :n], scene.d[:rows], scene.z0[:n]))
-    if z is not None:
-        scene.z[:n] = z
-    return z is not None
