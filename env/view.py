@@ -15,7 +15,40 @@ from .config import GameConfig
 
 @dataclass(frozen=True)
 class GameView:
-    """One game at one moment; every array is a copy. Names and units as in `BatchedMctf`, without the batch axis."""
+    """One game at one moment; every array is a copy. Names and units as in `BatchedMctf`, without the batch axis.
+
+    Boats are in the order of ``config.agent_ids``, n of them, blue first; of two entries the first is blue's.
+
+    Attributes:
+        config: rules.
+        state: (n, 11) of each boat: east and north m, heading deg, speed m/s, and what its autopilot remembers.
+        params: (n, n_params) parameters of each boat.
+        team: (n,) 0 blue, 1 red.
+        previous_position: (n, 2) before the last move, m.
+        is_tagged: (n,) tagged.
+        is_disabled: (n,) stopped by a power play.
+        has_flag: (n,) carries the other team's flag.
+        oob: (n,) out of bounds.
+        on_side: (n,) in its own half.
+        driven: (n,) the game decided the last command, not the policy.
+        tagging_cooldown_s: (n,) since the last tag, s, up to the cool-down.
+        made_tag: (n,) boat tagged in this step, -1 for none.
+        collisions: (n,) so far, looked for once a decision.
+        contacts: (n,) the same, looked for after every step.
+        flag_home: (2, 2) m.
+        flag_position: (2, 2) m; with its carrier while taken.
+        flag_taken: (2,) that team's flag is carried by an opponent.
+        captures: (2,) by each team.
+        grabs: (2,) likewise.
+        tags: (2,) likewise.
+        events: (2, 4) captures, grabs, tags and boats newly out of bounds in this decision.
+        power_start: (2,) decision at which a power play begins, -1 for none.
+        power_boats: (2, 2) boats that it disables.
+        power_begun: (2,) how often it has begun.
+        time_s: since the start, s.
+        terminated: a team has made the most captures that count.
+        truncated: the time is over.
+    """
 
     config: GameConfig
     state: Array

@@ -25,6 +25,7 @@ from .report import write_report
 from .result_files import table_name
 from .runner import RESULTS_FILE, Experiment, Run
 from .statistics import DIFFERENCE, summarise
+from .tables import COVERED_HEAD, LEFT_HEAD
 from .verdicts import COVERED, OFF, ON, all_breaches, state_of, summarise_verdicts
 from .warming import compile_game, compile_judge, compile_shield
 from .workers import Row, Workers
@@ -127,7 +128,7 @@ class AblationSettings:
 
     def heads(self, pairing: str) -> dict[str, str]:
         """By state (off, on, difference) what a pairing's tables call it, where not as `tables.COLUMNS` does."""
-        return {}
+        return {"on": COVERED_HEAD if self.shield_autopilot else LEFT_HEAD} if any(self.states) else {}
 
     def experiment(self, command: str) -> Experiment:
         """What `runner.execute` runs."""
@@ -307,7 +308,7 @@ def failure_warnings(rows: Sequence[Row]) -> list[str]:
             count, text = sum(int(row[f"{column}policy_failures"]) for row in failed), _first_text(failed, begin)
             found.append(
                 f"The {words} failed {count:,} time{'s' if count > 1 else ''}, in {len(failed)} of {len(rows)} games; "
-                "its boats stopped for those steps, so the figures are not those of a working policy."
+                "boats without an action stopped for those steps, so the figures are not those of a working policy."
                 + (f" First failure: {text}" if text else "")
             )
     return found

@@ -84,6 +84,7 @@ def encounters(
         return
     families = _names(family, "--family", f"all, or {', '.join(FAMILIES)}")
     families = tuple(FAMILIES) if families == ("all",) else families
+    o.check_used({"--noise": guards == (NONE,) and scenes.noise != 0.0}, "no filter looks; add --filter shield")
     settings = Settings(platform_pairs(platform), families, guards, n, seed, scenes.given(), not no_judge)
     run = where.run(settings.experiment())
     results = results_of(run)

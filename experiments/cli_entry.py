@@ -26,7 +26,7 @@ from .policy_checks import say_of_distance, say_of_elsewhere
 from .provenance import machine, versions
 from .replay_html import write_replay
 from .result_files import NEW, write_json
-from .runner import Run
+from .runner import EXPERIMENT_FILE, Run, check_settings
 from .workers import Workers
 
 app = App(
@@ -34,7 +34,7 @@ app = App(
     no_args_is_help=True,
 )
 Entry = Annotated[str, typer.Argument(metavar="ENTRY", help="Folder or zip with solution.py, as it is handed in.")]
-QUICK_GAMES, QUICK_TIME_S = 2, 200.0
+GAMES, QUICK_GAMES, QUICK_TIME_S = 5, 2, 200.0
 
 
 def check_path(entry: str) -> None:
@@ -106,7 +106,9 @@ class ReportedGames(o.GamesOptions):
     """Games that a report is of: each is played in every way."""
 
     opponents: o.Opponents = "easy,medium,hidden,hard"
-    games: Annotated[int, o.option("N", "Games against each opponent, in each of the ways it is played.")] = 5
+    games: Annotated[
+        int | None, o.option("N", "Games against each opponent, in each of the ways it is played.", default="5")
+    ] = None
     judge: o.Judge = "none"
 
 
@@ -130,13 +132,15 @@ def report(
     for name in names:
         policies.check(name)
     where = replace(where, folder=where.folder_of("entry-report"))
+    if where.resume and (where.folder_of("") / EXPERIMENT_FILE).exists():  # before the zip there is written again
+        check_settings(where.folder_of(""), {"preset": game.preset, "own": entry, "shield": shield})
     zip_file, why_none = shielded_zip(entry, where.folder_of(""), game.preset, shield, where.resume)
     settings = EntryGames(
         preset=game.preset,
         own=entry,
         zip_file=zip_file,
         opponents=names,
-        games=many.games,
+        games=GAMES if many.games is None else many.games,
         seed=many.seed,
         shield=shield,
         rules=game.given(),
@@ -144,7 +148,8 @@ def report(
         answer_s=answer_time,
     )
     if many.quick:
-        settings = small_version(settings, QUICK_TIME_S if game.max_time is None else game.max_time, QUICK_GAMES)
+        count = QUICK_GAMES if many.games is None else many.games
+        settings = small_version(settings, QUICK_TIME_S if game.max_time is None else game.max_time, count)
     warn(settings.how_many())
     results, run = run_games("entry report", settings, where, many.quick)
     results["warnings"] += why_none

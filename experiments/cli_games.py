@@ -29,7 +29,7 @@ from .provenance import head_of
 from .replay_html import check_endings, save_record
 from .result_files import NEW, write_json
 from .runner import Run
-from .tables import COVERED_WORDS, covered_table, game_table, goals_table, pairing_table, verdict_table
+from .tables import COVERED_WORDS, STATE_WORDS, covered_table, game_table, goals_table, pairing_table, verdict_table
 from .verdicts import check_judge
 
 FEW_GAMES = 20
@@ -37,6 +37,7 @@ FEW_GAMES = 20
 MOST_GAMES = 100_000
 """Games of a pairing at most: all are listed before the first is played."""
 QUICK_GAMES, QUICK_TIME_S = 4, 300.0
+OFF_WORDS = "the shield is off; add --shield"
 HITS_WORDS = (
     f"A hit is an entry into the radius: one stay within {RADII_M[1]:g} m may hold several\ninto {RADII_M[0]:g} m."
 )
@@ -96,6 +97,7 @@ def play(
     if KEYBOARD in names:
         warn(STEERING)
     human = look.window or KEYBOARD in names
+    o.check_used({"--speed": look.speed != WindowOptions.speed and not human}, "no window is shown; add --window")
     result = play_match(spec, _until_closed, "human", look.speed) if human else _played(spec)
     row = result.row
     out().print(game_table(row, spec.radii_m))
@@ -113,8 +115,8 @@ def _spec_of(
 ) -> MatchSpec:
     """The one game that options ask for."""
     asked, rules = shield.given(), game.given()
-    if asked and not who.shield:
-        raise ConfigError(f"the shield is off, and {', '.join(asked)} would change nothing; add --shield")
+    if not who.shield:
+        o.check_used(o.of_a_shield(shield, water, who.no_shield_autopilot), OFF_WORDS)
     return MatchSpec(
         game.preset,
         who.own,
@@ -163,9 +165,9 @@ def evaluate(
 
     Exit status: 0 done, 2 bad input or a policy that never played, 130 interrupted.
     """
-    unused = [name for name in shield_options.given() if name != "separation_m"]  # there hits are counted anyhow
-    if unused and not shield:
-        raise ConfigError(f"the shield is off, and {', '.join(unused)} would change nothing; add --shield")
+    if not shield:
+        unused = o.of_a_shield(shield_options, water, no_shield_autopilot)
+        o.check_used(unused | {"separation_m": False}, OFF_WORDS)  # there hits are counted anyhow
     states = {"states": (shield,), "shield_autopilot": not no_shield_autopilot}
     settings = settings_of(policy, game, shield_options, how, water, many, **states)
     end_run(*run_games("evaluate", settings, where, many.quick), where)
@@ -286,8 +288,8 @@ def show(results: dict[str, Any], folder: Path) -> None:
         say("")
     if results["pairings"]:
         say(f"{HITS_WORDS}\n")
-    if settings["covered"]:
-        out().print(f"{COVERED_WORDS}\n")
+    if True in settings["states"]:
+        out().print(f"{COVERED_WORDS if settings['covered'] else STATE_WORDS}\n")
     if results["goals"]:
         out().print(goals_table(results["goals"]))
         say("")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -172,7 +173,8 @@ class RunOptions:
     def run(self, experiment: Experiment, folder: Path | None = None) -> Run:
         """Run an experiment into a folder, that of its command unless one is given, and show progress."""
         folder, workers = folder or self.folder_of(experiment.command.replace(" ", "-")), self.workers()
-        with progress(experiment.unit, len(experiment.jobs)) as notice:
+        least = workers if isinstance(workers, int) else workers.processes
+        with progress(experiment.unit, len(experiment.jobs), least) as notice:
             return execute(experiment, folder, workers, self.resume, notice, warn)
 
     def workers(self) -> Workers:
@@ -188,6 +190,18 @@ class RunOptions:
     def copy(self, results: dict[str, Any]) -> None:
         """Write the JSON that ``--json`` asks for."""
         write_json(self.json_file, results)
+
+
+def check_used(given: Mapping[str, bool], why: str) -> None:
+    """Refuse (ConfigError) options that are given and change nothing; ``why`` says so, and what to do."""
+    if unused := [name for name, is_given in given.items() if is_given]:
+        raise ConfigError(f"{', '.join(unused)} would change nothing: {why}")
+
+
+def of_a_shield(shield: ShieldOptions, water: WaterOptions, no_autopilot: bool) -> dict[str, bool]:
+    """Options that only a shield heeds, and whether each is given; `check_used` takes them where there is none."""
+    given = dict.fromkeys(shield.given(), True)
+    return given | {"--noise": water.noise != 0.0, "--no-shield-autopilot": no_autopilot}
 
 
 def key_values(pairs: list[str] | None, option: str) -> dict[str, Any]:

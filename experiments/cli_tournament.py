@@ -20,8 +20,6 @@ from .tables import goals_table, titled
 from .verdicts import check_judge
 
 QUICK_TIME_S = 120.0
-WIDE = 120
-"""Characters of the widest table: ranks, scores and collisions with intervals, and the paper's."""
 
 
 @dataclass(frozen=True)
@@ -67,11 +65,14 @@ def tournament(
     )
     check_penalty(settings.penalty)
     if who.quick:
-        settings = replace(settings, repetitions=1, rules={"max_time_s": QUICK_TIME_S, **settings.rules})
+        settings = replace(settings, rules={"max_time_s": QUICK_TIME_S, **settings.rules})
+    shielded = set(settings.states) - {cup.OFF}
+    if not shielded:  # hits are counted at the separation anyhow
+        unused = dict.fromkeys(kept.given(), True) | {"separation_m": False}
+        o.check_used(unused, "no team is shielded; add --shield all")
     experiment, workers = settings.experiment(), where.workers()
     config = MatchSpec.of_job(experiment.jobs[0]).config()
     check_shield(settings.shield, config)
-    shielded = set(settings.states) - {cup.OFF}
     check_run(settings.teams, config, settings.shield if shielded else None, warn, trust=settings.trust)
     run = where.run(experiment)
     results = cup.results_of(run, settings)
@@ -93,7 +94,7 @@ def tournament(
 def _show(results: dict[str, Any], folder: Path) -> None:
     say(f"{cup.subtitle(results)}\n", *(f"WARNING: {words}\n" for words in results["warnings"]))
     for table in all_tables(results):
-        out(WIDE).print(titled(table.title, table.heads, table.rows), "")
+        out().print(titled(table.title, table.heads, table.rows), "")
     if results["goals"]:
         out().print(goals_table(results["goals"]))
     for one in results["failed"]:

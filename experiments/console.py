@@ -109,17 +109,28 @@ class OnceCommand(TyperCommand):
         """Parse as usual what gives no option twice; ``--help-all`` shows the whole help instead.
 
         Raises:
-            UsageError: an option is given twice.
+            UsageError: an option is given twice, or without its value.
         """
         if "--help-all" in args:
             ctx.meta[ALL] = True
             args = ["--help"]
+        self._check_values(ctx, args)
         _, _, given = self.make_parser(ctx).parse_args(args=list(args))
         for option in given:
             if isinstance(option, TyperOption) and not option.multiple and given.count(option) > 1:
                 joined = ", values joined by commas" if "," in (option.metavar or "") else ""
                 ctx.fail(f"{option.opts[0]} is given twice; give it once{joined}")
         return list(super().parse_args(ctx, args))
+
+    def _check_values(self, ctx: Any, args: list[str]) -> None:
+        """Refuse an option that another one follows, or nothing, in place of its value."""
+        options = [option for option in self.get_params(ctx) if isinstance(option, TyperOption)]
+        known = {name for option in options for name in (*option.opts, *option.secondary_opts)}
+        takes = {name: option for option in options if not option.is_flag for name in option.opts}
+        for name, after in zip(args, [*args[1:], None], strict=False):
+            if name in takes and (after is None or after in known):
+                found = "nothing follows it" if after is None else f"{after} follows it"
+                ctx.fail(f"{name} has no value ({found}); give {name} {takes[name].metavar}")
 
 
 class App(typer.Typer):
@@ -225,7 +236,15 @@ def finish(passed: bool) -> None:
 class PlainProgress:
     """Progress where there is no terminal to draw a bar on: how much is done and left, at most a line in `EVERY_S`.
 
-    ``at_once``: the first that is told is printed, too, so that a long command is seen to have begun.
+    The time left is told by the rate since the first was done, which may have waited until machine code was compiled.
+
+    Args:
+        words: what is counted.
+        total: how many there are.
+        console: where to.
+        at_once: print the first that is told, too, so that a long command is seen to have begun.
+        least: how many are done beyond the first before the time left is told: as many as are done side by side.
+        clock: s.
     """
 
     def __init__(
@@ -234,23 +253,28 @@ class PlainProgress:
         total: int | None,
         console: Console,
         at_once: bool = False,
+        least: int = 1,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._words, self._total, self._console, self._clock = words, total, console, clock
-        self._began_s = clock()
-        self._next_s = self._began_s + (0.0 if at_once else EVERY_S)
+        self._next_s = clock() + (0.0 if at_once else EVERY_S)
+        self._least = least
         self._before: int | None = None
+        self._first: tuple[int, float] | None = None
 
     def __call__(self, done: int, words: str = "", total: int | None = None) -> None:
         """Tell that so many are done in all; those told first may be an earlier run's and say nothing of the rate."""
         now_s, self._total = self._clock(), total or self._total or done
         if self._before is None:
             self._before = done
+        elif self._first is None and done > self._before:
+            self._first = done, now_s
         if now_s < self._next_s:
             return
-        self._next_s, made, left = now_s + EVERY_S, done - self._before, ""
-        if made > 0 and done < self._total:
-            left = f"about {time_words((self._total - done) * (now_s - self._began_s) / made)} left"
+        self._next_s, left = now_s + EVERY_S, ""
+        if self._first is not None and self._first[0] + self._least <= done < self._total:
+            each_s = (now_s - self._first[1]) / (done - self._first[0])
+            left = f"about {time_words((self._total - done) * each_s)} left"
         parts = [f"{self._words}: {done:,} of {self._total:,}", words, left]
         self._console.print(", ".join(part for part in parts if part), soft_wrap=True)
 
@@ -267,18 +291,18 @@ def time_words(time_s: float) -> str:
 def bars() -> Iterator[Callable[..., Callable[..., None]]]:
     """Show progress on stderr, on a terminal as bars, elsewhere as a plain line now and then.
 
-    What it yields begins one: ``begin(words, total, at_once)`` gives what is told how much is done, what else is known
-    in words, and the total where it is known only now.
+    What it yields begins one: ``begin(words, total, at_once, least)``, see `PlainProgress`, gives what is told how much
+    is done, what else is known in words, and the total where it is known only now.
     """
     console = err()
     if not console.is_terminal:
-        yield lambda words, total=None, at_once=False: PlainProgress(words, total, console, at_once)
+        yield lambda words, total=None, at_once=False, least=1: PlainProgress(words, total, console, at_once, least)
         return
     columns = (TextColumn("{task.description}", markup=False), BarColumn(20), MofNCompleteColumn(), TimeElapsedColumn())
     left = (TextColumn("left"), TimeRemainingColumn(), TextColumn("{task.fields[more]}", markup=False))
     with Progress(*columns, *left, console=console, transient=True) as bar:
 
-        def begin(words: str, total: int | None = None, at_once: bool = False) -> Callable[..., None]:
+        def begin(words: str, total: int | None = None, at_once: bool = False, least: int = 1) -> Callable[..., None]:
             task = bar.add_task(words, total=total, more="")
 
             def notice(done: int, more: str = "", total: int | None = None) -> None:
@@ -290,8 +314,8 @@ def bars() -> Iterator[Callable[..., Callable[..., None]]]:
 
 
 @contextmanager
-def progress(words: str, total: int) -> Iterator[Callable[..., None]]:
-    """A single one of `bars`: call what it yields with the number of finished jobs."""
+def progress(words: str, total: int, least: int = 1) -> Iterator[Callable[..., None]]:
+    """A single one of `bars`: call what it yields with the number of finished jobs, ``least`` of them side by side."""
     with bars() as begin:
-        notice = begin(words, total)
+        notice = begin(words, total, least=least)
         yield lambda done, *_: notice(done)

@@ -8,7 +8,7 @@ from typing import Any
 
 from steerclear.shield.foreign import visible
 
-from .tables import goal_cells
+from .tables import goal_cells, verdict_of
 
 MADE = "<!-- made by `steerclear docs`; do not edit -->"
 
@@ -38,7 +38,8 @@ GOAL_HEADS = ["", "measured", "goal", ""]
 
 def goal_row(goal: Mapping[str, Any]) -> list[str]:
     """Row of a table of goals: what was measured, what is asked, whether it is met."""
-    return [*goal_cells(goal), {True: "met", False: "**not met**", None: "no data"}[goal["met"]]]
+    words, _ = verdict_of(goal)
+    return [*goal_cells(goal), words.replace("not met", "**not met**")]
 
 
 def goals_table(goals: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -201,6 +201,19 @@ def game_goals(separation_m: float) -> list[Goal]:
     def paired(measure: Callable[[pd.DataFrame], Interval | None]) -> Callable[[pd.DataFrame], Interval | None]:
         return lambda table: measure(pairs) if len(pairs := pairs_of(table)) else None
 
+    def counted(count: Callable[[pd.DataFrame, str], Any], more: Callable[[pd.DataFrame], str]) -> Any:
+        """What a ratio rests on, in words, and what is beside it."""
+
+        def words(table: pd.DataFrame) -> str:
+            pairs = pairs_of(table)
+            sums = [f"{int(count(pairs, state).sum()):,} {state}" for state in ("off", "on")] if len(pairs) else []
+            return "; ".join(filter(None, (f"{', '.join(sums)} in {len(pairs)} games each", more(table))))
+
+        return words
+
+    def captures(pairs: pd.DataFrame, state: str) -> Any:
+        return pairs[f"captures_{state}"]
+
     def mates(pairs: pd.DataFrame) -> Interval:
         return Interval(float(own_hits(pairs, "teammate", "on").sum()), float("nan"), float("nan"))
 
@@ -216,10 +229,14 @@ def game_goals(separation_m: float) -> list[Goal]:
             paired(lambda pairs: paired_ratio(*(own_hits(pairs, "opponent", state) for state in ("off", "on")))),
             "<=",
             0.1,
-            driven("opponent"),
+            counted(lambda pairs, state: own_hits(pairs, "opponent", state), driven("opponent")),
         ),
         Goal(
-            "captures, on / off", paired(lambda pairs: paired_ratio(pairs.captures_off, pairs.captures_on)), ">=", 0.9
+            "captures, on / off",
+            paired(lambda pairs: paired_ratio(captures(pairs, "off"), captures(pairs, "on"))),
+            ">=",
+            0.9,
+            counted(captures, lambda table: ""),
         ),
         Goal("deadlocks, shielded, per game", paired(lambda pairs: _rate(pairs, "deadlocks_on")), "<=", 0.0),
         Goal(

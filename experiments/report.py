@@ -15,15 +15,24 @@ from .markdown import MADE, goals_table, line, table
 from .metrics import RADII_M, REASONS, breach_column, game_metrics_of
 from .page import render, write_page
 from .play.conditions import words_of
-from .tables import COVERED_WORDS, columns_of, goal_cells, interval_text, limits_text, number_text
+from .tables import (
+    COVERED_HEAD,
+    COVERED_WORDS,
+    columns_of,
+    goal_cells,
+    interval_text,
+    limits_text,
+    number_text,
+    verdict_of,
+)
 from .tables import Table as Table
 from .verdicts import COVERED, HEADS, OFF, ON, state_of, verdict_rows
 
 Summary = Mapping[str, Any]
-SHIELDS = ((OFF, "shield off"), (ON, "shield on"), (COVERED, "shield on, covering boats that the game drives"))
+SHIELDS = ((OFF, "shield off"), (ON, "shield on"), (COVERED, f"shield {COVERED_HEAD}"))
 MOST_ROWS, MOST_BREACHES = 600, 200
 CHANGED_SHARE_GOAL = 5.0
-VERDICTS = {True: ("met", "good"), False: ("not met", "bad"), None: ("no data", "muted")}
+STYLES = {"green": "good", "red": "bad", "yellow": "muted"}
 NOTE = (
     "Whiskers and brackets are 95 % intervals. A hit is one entry of two boats into the radius, however long it lasts. "
     "The dashed line marks the separation radius, and in the plot of steps changed the goal of 5 %."
@@ -119,11 +128,11 @@ def goal_rows(goals: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
     """What was asked, what was measured, and whether it is met, in words."""
     rows = []
     for goal in goals:
-        verdict, style = VERDICTS[goal["met"]]
+        verdict, colour = verdict_of(goal)
         name, measured, asked = goal_cells(goal)
         asked = asked.replace("<=", "≤").replace(">=", "≥")
         measured += limits_text(goal)
-        rows.append({"name": name, "measured": measured, "asked": asked, "verdict": verdict, "style": style})
+        rows.append({"name": name, "measured": measured, "asked": asked, "verdict": verdict, "style": STYLES[colour]})
     return rows
 
 

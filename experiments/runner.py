@@ -13,8 +13,8 @@ Contract:
 * ``run`` is importable by name (workers are spawned) and gives a job's rows, mappings of plain values. An error in one
   job stops no other: it is listed in `Run.failed`.
 * ``rows.jsonl`` grows by one line per finished job and survives Ctrl-C, SIGTERM, kill -9 and a full disk. A line counts
-  when it is as it was written, by the code that runs now. With ``resume`` the jobs found there are not run again; those
-  of other settings stay in the file and count for nothing.
+  when it is as it was written, by the code that runs now. With ``resume`` the jobs found there are not run again. Other
+  settings are refused, unless they only add jobs.
 * Ctrl-C ends `execute` with what is there: ``run.interrupted`` is true, so that the command still writes its results.
 * One process writes into a folder at a time, as long as its `Run` lives.
 """
@@ -37,7 +37,7 @@ from filelock import BaseFileLock
 from steerclear.shield.exceptions import ConfigError
 
 from .provenance import code_digest, machine, versions
-from .result_files import lock_folder, plain_value, told_settings, write_json, write_table, writing
+from .result_files import lock_folder, plain_value, read_json, told_settings, write_json, write_table, writing
 from .workers import Job, Row, Workers, end_failed, outcomes
 
 if TYPE_CHECKING:
@@ -47,6 +47,8 @@ EXPERIMENT_FILE, ROWS_FILE, RESULTS_FILE = "experiment.json", "rows.jsonl", "res
 OLD_ROWS_FILE = "games.jsonl"
 BESIDE = ("rows.csv", "rows.parquet", "report.html", "replay.html", "entry.html")
 """What commands write into a folder beside those."""
+MOST_NAMED = 4
+"""Settings that differ which a refusal names; more are counted."""
 Notice = Callable[[int, int], None]
 """Told how many jobs are done and how many there are."""
 logger = logging.getLogger(__name__)
@@ -160,19 +162,20 @@ def execute(
         tell: told in words, once, what is gone on with.
 
     Raises:
-        ConfigError: the folder holds results and ``resume`` is off, or another experiment's; another process writes
-            there; or it cannot be written to.
+        ConfigError: the folder holds results and ``resume`` is off, or another experiment's, or results of other
+            settings that these jobs leave out; another process writes there; or it cannot be written to.
     """
     started = time.perf_counter()
     lock = open_folder(folder, experiment.command, resume)
     ids = [job_id(job) for job in experiment.jobs]
-    before = read_rows(folder / ROWS_FILE)
+    before, there = _read(folder / ROWS_FILE)
+    if there - set(ids) or (not there and (folder / RESULTS_FILE).exists()):
+        check_settings(folder, experiment.settings)
     kept = {name: before[name] for name in ids if name in before}
     if resume:
         words = f"{len(kept)} of {len(ids)} {experiment.unit} are in {folder / ROWS_FILE} and are taken from there"
         if others := len(before) - len(kept):
-            words += f"; {others} there are of other settings, or of a policy's files before they changed, and count "
-            words += "for nothing here"
+            words += f"; {others} there are of a policy's files before they changed, and count for nothing here"
         tell(words)
     head = {"command": experiment.command, "settings": told_settings(experiment.settings), "jobs": len(experiment.jobs)}
     write_json(folder / EXPERIMENT_FILE, {**head, "versions": versions(), "code": code_digest()})
@@ -234,6 +237,37 @@ def _check_folder(folder: Path, command: str, resume: bool) -> None:
             raise ConfigError(f"{folder / name} would be written over; choose another --out, or move it")
 
 
+def check_settings(folder: Path, settings: Mapping[str, Any]) -> None:
+    """Refuse (ConfigError) to go on in a folder that was begun with others of these settings: it names them."""
+    path = folder / EXPERIMENT_FILE
+    content = read_json(path, "settings", "choose another --out") if path.exists() else {}
+    kept = content.get("settings") or {} if isinstance(content, dict) else {}
+    here = json.loads(json.dumps(told_settings(settings), default=plain_value))
+    before, now = _flat({name: kept[name] for name in here if name in kept}), _flat(here)
+    others = [name for name in {**now, **before} if before.get(name) != now.get(name)]
+    if others:
+        told = [f"{name} was {_short(before.get(name))}, is {_short(now.get(name))}" for name in others[:MOST_NAMED]]
+        more = f"; and {len(others) - MOST_NAMED} more" if len(others) > MOST_NAMED else ""
+        raise ConfigError(
+            f"{folder} holds results of other settings ({'; '.join(told)}{more}), which this would replace; "
+            "give the same settings, or choose another --out"
+        )
+
+
+def _flat(settings: Mapping[str, Any], before: str = "") -> dict[str, Any]:
+    """Nested settings as one mapping, names joined by dots."""
+    flat: dict[str, Any] = {}
+    for name, value in settings.items():
+        flat |= _flat(value, f"{before}{name}.") if isinstance(value, dict) else {before + name: value}
+    return flat
+
+
+def _short(value: Any) -> str:
+    """A setting as a user writes it, cut where it is long."""
+    text = "not set" if value is None else ",".join(map(str, value)) if isinstance(value, list) else str(value)
+    return text if len(text) <= 60 else f"{text[:59]}…"
+
+
 def check_version(folder: Path) -> None:
     """Refuse (ConfigError) a folder of results of an earlier version, of which only ``docs`` reads results.json."""
     if (folder / OLD_ROWS_FILE).exists():
@@ -280,14 +314,20 @@ def append_row(path: Path, name: str, rows: Sequence[Row]) -> None:
 
 def read_rows(path: Path) -> dict[str, list[Row]]:
     """Rows of every job in a file, by `job_id`; the last line of a job counts. ConfigError where it is no text."""
+    return _read(path)[0]
+
+
+def _read(path: Path) -> tuple[dict[str, list[Row]], set[str]]:
+    """`read_rows` of the code that runs now, and the names of all jobs there, of whatever code."""
     try:
         lines = path.read_bytes().decode().split("\n")
     except (OSError, UnicodeDecodeError) as error:
         why = "is no text" if isinstance(error, UnicodeDecodeError) else error.strerror
         raise ConfigError(f"cannot read {path} ({why}); move it away or choose another --out") from error
-    found, others = dict[str, list[Row]](), 0
+    found, names, others = dict[str, list[Row]](), set[str](), 0
     for number, line in enumerate(lines, start=1):
         entry = read_line(line) if line else None
+        names |= {entry["job"]} if entry is not None else set()
         if line and entry is None:
             logger.warning("%s line %d is not complete, or not as it was written; it is left out", path, number)
         elif entry is not None and entry["code"] == code_digest():
@@ -296,7 +336,7 @@ def read_rows(path: Path) -> dict[str, list[Row]]:
             others += 1
     if others:
         logger.warning("%s: %d results are of other code or versions, count for nothing here", path, others)
-    return found
+    return found, names
 
 
 def read_line(line: str) -> dict[str, Any] | None:

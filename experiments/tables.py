@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from rich import box
-from rich.console import Group
+from rich.cells import cell_len
+from rich.console import Console, ConsoleOptions, Group, RenderResult
 from rich.table import Table as RichTable
 from rich.text import Text
 
@@ -19,17 +20,20 @@ COLUMNS = {
     "off": "shield off",
     "on": "shield on",
     "difference": "on - off, paired",
-    "covered": "covered",
+    "covered": "on, covered",
     "difference_covered": "covered - off, paired",
 }
 """What is shown of a pairing's figures, where there is any, and its head."""
-COVERED_WORDS = (
-    "Shield on leaves boats that the game drives (tagged, out of bounds) to it, as a real game and a wrapped zip do; "
-    "covered decides for them too. Goals are of shield on."
+LEFT_HEAD, COVERED_HEAD = "on, left to the game", "on, covered"
+STATE_WORDS = (
+    "Left to the game: boats that the game drives (tagged, out of bounds) are not shielded, as in a real game and a "
+    "wrapped zip; covered: they are."
 )
+COVERED_WORDS = f"{STATE_WORDS} Goals are judged on shield on, left to the game."
 _COVERED_SHOWN = ("captures", "net_captures", "clean_games", "changed_share")
 """Figures of the small table of covered games, beside hits; report and results have all."""
-_VERDICTS = {True: Text("met", "green"), False: Text("not met", "red"), None: Text("no data", "yellow")}
+LEAST = 24
+"""Characters in which words of a first column still go on in a second line."""
 
 
 @dataclass(frozen=True)
@@ -77,35 +81,91 @@ def figures_table(title: str, metrics: Iterable[Mapping[str, Any]], columns: Map
 def verdict_table(summary: Mapping[str, Any]) -> Group | None:
     """What the post-hoc analysis says about a pairing's breaches; None where it was not asked."""
     rows = verdict_rows(summary.get("verdicts") or {}, interval_text)
-    return titled("Hits judged in hindsight", SHORT_HEADS, rows) if rows else None
+    seldom = [SHORT_HEADS.index(head) for head in ("inside", "unjudged")]
+    shown = [k for k in range(len(SHORT_HEADS)) if k not in seldom or any(row[k] not in ("0", "-") for row in rows)]
+    lines = [[row[k] for k in shown] for row in rows]
+    return titled("Hits judged in hindsight", [SHORT_HEADS[k] for k in shown], lines) if rows else None
 
 
 def titled(
     title: str, heads: Sequence[str], rows: Sequence[Sequence[str | Text]], width: int | None = None, wrap: bool = False
 ) -> Group:
-    """Lay out a table for the terminal under its title.
+    """Lay out a table for the terminal under its title; nothing of it is cut off, however narrow that is.
 
     Args:
         title: in bold above.
         heads: of the columns, the first words, the others numbers.
         rows: cells.
         width: of a column of numbers, at least, characters.
-        wrap: whether long words of the first column go on in a second line rather than lose their end.
+        wrap: whether long words of the first column go on in a second line.
     """
-    # the dividers alone part the columns: four columns of intervals fit 80 characters
-    table = RichTable(box=box.SIMPLE_HEAD, show_edge=False, padding=0, pad_edge=False, show_header=any(heads))
-    table.add_column(heads[0], no_wrap=len(heads) > 1 and not wrap)
-    for head in heads[1:]:
-        table.add_column(head, justify="right", no_wrap=True, min_width=width)
-    for row in rows:
-        table.add_row(*row)
-    return Group(Text(title, style="bold"), table)
+    return Group(Text(title, style="bold"), _Fitted(heads, rows, width, wrap))
+
+
+@dataclass(frozen=True)
+class _Fitted:
+    """A table that fits the terminal: else limits and heads stand in a second line, else columns in a further table."""
+
+    heads: Sequence[str]
+    rows: Sequence[Sequence[str | Text]]
+    width: int | None
+    wrap: bool
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        columns, most = list(range(len(self.heads))), options.max_width
+        if self._room(columns, False) <= most:
+            yield self._of(columns, False)
+            return
+        while columns:
+            shown = columns[:]
+            while len(shown) > 2 and self._room(shown, True) > most:
+                shown.pop()
+            yield self._of(shown, True)
+            columns = columns[:1] + columns[len(shown) :] if len(shown) < len(columns) else []
+
+    def _room(self, columns: Sequence[int], broken: bool) -> int:
+        """Characters that these columns need, side by side."""
+        tables = (self.heads, *self.rows)
+        cells = [[str(self._cell(row, k, broken)) for row in tables] for k in columns]
+        room = [max(cell_len(line) for cell in column for line in cell.split("\n")) for column in cells]
+        room = [max(wide, self.width or 0) if k else wide for k, wide in enumerate(room)]
+        return sum(room[1:]) + (min(room[0], LEAST) if self.wrap else room[0]) + len(room) - 1
+
+    def _cell(self, row: Sequence[str | Text], k: int, broken: bool) -> str | Text:
+        """A cell; broken: limits, or the words of a head, stand in a second line."""
+        cell, at = row[k], " " if row is self.heads else " ["
+        return cell.replace(at, f"\n{at.strip()}", 1) if broken and isinstance(cell, str) else cell
+
+    def _of(self, columns: Sequence[int], broken: bool) -> RichTable:
+        # the dividers alone part the columns: four columns of intervals fit 80 characters
+        table = RichTable(box=box.SIMPLE_HEAD, show_edge=False, padding=0, pad_edge=False, show_header=any(self.heads))
+        for k in columns:
+            head = self._cell(self.heads, k, broken)
+            if k == columns[0]:
+                table.add_column(head, no_wrap=len(self.heads) > 1 and not self.wrap)
+            else:
+                table.add_column(head, justify="right", no_wrap=True, min_width=self.width)
+        for row in self.rows:
+            table.add_row(*(self._cell(row, k, broken and k > 0) for k in columns))
+        return table
 
 
 def goals_table(goals: Sequence[Mapping[str, Any]]) -> Group:
     """What is asked, what was measured, whether it is met."""
-    rows: list[list[str | Text]] = [[*goal_cells(goal), _VERDICTS[goal["met"]]] for goal in goals]
+    rows: list[list[str | Text]] = []
+    for goal in goals:
+        name, measured, asked = goal_cells(goal)
+        rows.append([name, measured + limits_text(goal, short_limit), asked, Text(*verdict_of(goal))])
     return titled("Goals", ["", "measured", "goal", ""], rows, wrap=True)
+
+
+def verdict_of(goal: Mapping[str, Any]) -> tuple[str, str]:
+    """Whether a goal is met, in words and by a colour; an interval on both sides of the limit settles nothing."""
+    words, colour = {True: ("met", "green"), False: ("not met", "red"), None: ("no data", "yellow")}[goal["met"]]
+    low, high = goal.get("low"), goal.get("high")
+    if goal["met"] is not None and low is not None and high is not None and low < goal["limit"] < high:
+        return f"{words} (too few to tell)", "yellow"
+    return words, colour
 
 
 def goal_cells(goal: Mapping[str, Any]) -> list[str]:

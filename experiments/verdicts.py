@@ -153,8 +153,11 @@ SIDES = ("own", "opponent", "both", "game", "neither", "start")
 OFF, ON, COVERED = STATES = ("off", "on", "covered")
 """States of the shield; covered, where it is played beside on: also for boats that the game drives."""
 _COUNTED = (*(outcome.value for outcome in Outcome), NOT_JUDGED)
-HEADS = ("", "breaches", "avoidable", "unavoidable", "started inside", "not judged", "avoidable per game")
-SHORT_HEADS = ("", "breaches", "avoid.", "unavoid.", "inside", "unjudged", "avoidable/game")
+HEADS = (
+    *("", "hits", "game-controlled", "avoidable", "unavoidable", "started inside", "not judged", "avoidable per game"),
+)
+SHORT_HEADS = ("", "hits", "game-controlled", "avoid.", "unavoid.", "inside", "unjudged", "avoidable/game")
+"""Game-controlled hits are those whose own boats the game drove: part of the hits, with verdicts like the others."""
 
 
 def verdict_columns(breaches: Sequence[Row] | None, radius_m: float) -> dict[str, int | None]:
@@ -177,8 +180,8 @@ def summarise_verdicts(rows: Sequence[Row]) -> dict[str, Any]:
 
     Returns:
         Per shield state off, on and, where there are such games, covered: ``games`` and ``games_judged``; per kind the
-        number of breaches per outcome, ``breaches``, ``avoidable_per_game`` (value, low, high; None when no game was
-        judged) and ``responsible`` (number per side).
+        number of breaches per outcome, ``breaches``, ``game_controlled`` (those of boats that the game drove),
+        ``avoidable_per_game`` (value, low, high; None when no game was judged) and ``responsible`` (number per side).
     """
     summary = {}
     for state in STATES:
@@ -202,6 +205,7 @@ def _kind(breaches: Sequence[Row], kind: str, games: int) -> dict[str, Any]:
     sides = [breach["responsible"] for breach in breaches if breach["kind"] == kind]
     return {
         "breaches": sum(counts.values()),
+        "game_controlled": sum(breach["kind"] == kind and bool(breach.get("driven")) for breach in breaches),
         **counts,
         "avoidable_per_game": asdict(count_interval(counts["avoidable"], games)) if games else None,
         "responsible": {side: sides.count(side) for side in SIDES},
@@ -231,7 +235,7 @@ def verdict_rows(verdicts: Mapping[str, Any], interval_text: Any) -> list[list[s
             told = ["not judged", *["-"] * (len(HEADS) - 2)]
             if part["games_judged"]:
                 counts = part[kind]
-                told = [str(counts[name]) for name in ("breaches", *_COUNTED)]
+                told = [str(counts.get(name, "-")) for name in ("breaches", "game_controlled", *_COUNTED)]
                 told.append(interval_text(counts["avoidable_per_game"]))
             lines.append([f"{kind}, {state}", *told])
     return lines

@@ -11,7 +11,7 @@ from steerclear.shield.arrays import NoNumbersError, numbers
 from steerclear.shield.exceptions import ConfigError, GameError, PolicyError
 from steerclear.shield.jit import Array, IntArray
 from steerclear.shield.platforms import Platform, get_platform
-from steerclear.shield.wrappers.actions import short
+from steerclear.shield.wrappers.actions import check_boats, short
 from steerclear.shield.wrappers.readers import reader_of
 
 HOLD = (0.0, 0.0)
@@ -58,8 +58,7 @@ class SeenGame:
         Raises:
             PolicyError: none, unknown or repeated boats, or boats of both teams.
         """
-        if not agent_ids or len(set(agent_ids)) != len(agent_ids) or not set(agent_ids) <= set(self.agent_ids):
-            raise PolicyError(f"agent_ids are {list(agent_ids)}; give different ones of {', '.join(self.agent_ids)}")
+        check_boats(agent_ids, self.agent_ids)
         if len({int(self.team[self.agent_ids.index(name)]) for name in agent_ids}) != 1:
             raise PolicyError(f"agent_ids {list(agent_ids)} are of both teams; one policy plays one team")
 
@@ -122,7 +121,7 @@ class ActionReader:
     def problem(self, agent_id: str, action: Any) -> Fault | None:
         """Return the fault of an action; None if it is usable."""
         if action is None:
-            return "no answer", "compute_action returned None; return an action"
+            return "no answer", "the policy returned None; return an action"
         try:
             if not isinstance(action, (str, bytes)) and not np.isfinite(numbers(action)).all():
                 return "not finite", f"{short(action)} is not finite"

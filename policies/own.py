@@ -16,7 +16,7 @@ from steerclear.shield.foreign import describe_error
 
 from .adapters import from_agents, from_callable
 from .protocol import TeamPolicy
-from .submissions.stage import ENTRY_FILE
+from .submissions.stage import ENTRY_FILE, near_files
 
 DEFAULT = "act"
 """Name that is used if none is given."""
@@ -47,7 +47,9 @@ def check_own(where: str, name: str) -> None:
     except (ImportError, ValueError):
         there = False
     if not there:
-        raise PolicyError(f"there is no policy {where}:{name}: no file {path or where + '.py'}; give FILE.py:NAME")
+        hint = near_files(where if where.endswith(".py") else f"{where}.py")
+        file = path or f"{where}.py"
+        raise PolicyError(f"there is no policy {where}:{name}: no file {file}; {hint}give FILE.py:NAME")
 
 
 def load_own(where: str, name: str) -> TeamPolicy:
@@ -80,7 +82,7 @@ def _module(where: str) -> ModuleType:
     if path is None:
         return importlib.import_module(where)
     if not path.is_file():
-        raise PolicyError(f"there is no policy at {path}; give a Python file with {FORMS}")
+        raise PolicyError(f"there is no policy at {path}; {near_files(where)}give a Python file with {FORMS}")
     if str(path.parent) not in sys.path:
         sys.path.insert(0, str(path.parent))
     spec = importlib.util.spec_from_file_location(f"steerclear_own_{path.stem}", path)

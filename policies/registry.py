@@ -29,6 +29,7 @@ from .scripted.plan import (
     words_of,
 )
 from .scripted.team import ScriptedTeam
+from .submissions.stage import near_files
 
 Roles = str | Sequence[str] | None
 
@@ -198,7 +199,8 @@ def check(name_or_path: str | Path) -> None:
         raise unknown_policy(text)
     if not path.exists():
         raise PolicyError(
-            f"there is no policy at {path}; give a submission's folder or zip, sb3:PATH.zip or weights:PATH.npz"
+            f"there is no policy at {path}; {near_files(path)}give a submission's folder or zip, sb3:PATH.zip or "
+            "weights:PATH.npz"
         )
 
 
@@ -250,7 +252,7 @@ def looks_like_path(text: str) -> bool:
 def unknown_policy(name: str) -> PolicyError:
     """Return the error for an unknown name."""
     near = difflib.get_close_matches(name, names(), n=3, cutoff=0.5)
-    hint = f"did you mean {', '.join(near)}? " if near else ""
+    hint = near_files(name, near)
     files = "a submission's folder or zip, sb3:PATH.zip, weights:PATH.npz, your own FILE.py or MODULE:NAME"
     known = f"known: {', '.join(names())}; or give {files}"
     return PolicyError(f"unknown policy {name!r}; {hint}{known}")

@@ -4,9 +4,9 @@ import math
 
 from steerclear.shield import Commands, Fleet, Shield
 
-shield = Shield(separation_m=2.5)
+shield = Shield(separation_m=2.5, profile="constant_velocity")
 fleet = Fleet.of(
-    position_m=[[0, 0], [0, 5.5]],  # east, north
+    position_m=[[0, 0], [0, 5.3]],  # east, north
     heading_rad=[0, math.pi],  # clockwise from north: head on
     speed_mps=[2, 2],
     team=[0, 1],  # ours, theirs

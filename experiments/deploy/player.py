@@ -24,6 +24,7 @@ from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
 from steerclear.env.motion import is_on_side
 from steerclear.policies.actions import HOLD, ActionReader
+from steerclear.policies.own import own_code
 from steerclear.shield.bridge.feed import GameState, game_state
 from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.messages import Snapshot
@@ -31,6 +32,7 @@ from steerclear.shield.exceptions import FleetError, FleetFileError, PolicyError
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.usv import wrap_degrees
+from steerclear.shield.wrappers.actions import team_answer
 
 from .referee import game_config, stand_in_config
 
@@ -78,10 +80,10 @@ def cast_of(fleet: FleetFile, boats: Sequence[str] | None = None, policy: str = 
         ours = tuple(boat.agent for boat in map(fleet.boat, wanted) if boat.agent is not None)
         rows = tuple(i for i, boat in enumerate(fleet.boats) if boat.agent is not None)
         return Cast(game_config(fleet), fleet.names, rows, ours)
-    if policy not in NEED_NO_GAME:
+    if policy not in NEED_NO_GAME and own_code(policy) is None:
         raise FleetFileError(
             f"no boat plays and policy {policy!r} needs a game: give boats an agent: agent_0, agent_1, ..., blue "
-            f"first; boats without a game are steered by --policy {' or '.join(NEED_NO_GAME)}"
+            f"first; boats without a game are steered by --policy {', '.join(NEED_NO_GAME)} or FILE.py:NAME of your own"
         )
     config, count = stand_in_config(fleet, wanted), len(wanted)
     own, nobody = tuple(fleet.names.index(name) for name in wanted), (NOBODY,) * count
@@ -234,7 +236,7 @@ class Player:
             if agent_id not in self._cast.ours or (agent_id in problems and not driven[i]):
                 relative[i] = np.nan
         names = dict(zip(env.possible_agents, self._cast.players, strict=True))
-        texts = tuple(f"{names[agent_id]}: {text}" for agent_id, text in problems.items())
+        texts = tuple(f"{names.get(agent_id, agent_id)}: {text}" for agent_id, text in problems.items())
         commands = np.full((len(self._cast.names), 2), np.nan)
         headings_rad = np.radians((env.core.state[0, :, L.HEADING] + relative[:, 1]) % 360.0)
         speeds_mps = np.clip(relative[:, 0], -env.core.max_speed_mps, env.core.max_speed_mps)
@@ -256,10 +258,10 @@ class Player:
         ours = self._cast.ours
         try:
             answer = self.policy.act(self.observer.observations(), self.observer.infos())
-            actions = {agent_id: answer[agent_id] for agent_id in ours}
+            actions, faults = team_answer(answer, ours)
         except (Exception, SystemExit) as error:  # foreign code may raise anything, and call exit()
             return dict.fromkeys(ours, HOLD), dict.fromkeys(ours, f"raised {_line(error, 200)}")
-        problems = dict(getattr(self.policy, "held", {}))
+        problems = {**faults, **getattr(self.policy, "held", {})}
         for agent_id, action in actions.items():
             found = self._reader.problem(agent_id, action)
             if found is not None:

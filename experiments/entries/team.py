@@ -25,7 +25,7 @@ from steerclear.policies.protocol import TeamPolicy
 from steerclear.policies.registry import SB3_PREFIX, WEIGHTS_PREFIX, looks_like_path
 from steerclear.policies.sb3 import trained_here
 from steerclear.policies.submissions.made_for import check_game, made_for
-from steerclear.policies.submissions.stage import ENTRY_FILE
+from steerclear.policies.submissions.stage import no_submission
 from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.foreign import plain_text
 
@@ -176,7 +176,7 @@ class EntryTeam(ForeignTeam):
         if prefix:  # looked at before a process is started, in the words of whoever would load it
             policies.check(path)
         elif not file.exists():
-            raise PolicyError(f"there is no submission at {path}; give a folder or a zip with {ENTRY_FILE}")
+            raise PolicyError(no_submission(path))
         self._path, self._answer_s, self._lost = path, answer_s, ""
         self._process, self._made = EntryProcess(path, limits), made_for(path)
         super().__init__(plain_text(self._first("load", f"{prefix}{file.absolute()}", options).get("name"), 80))

@@ -9,6 +9,8 @@ from typing import Any
 
 from steerclear.env.mctf import MctfEnv
 from steerclear.policies.actions import HOLD, ActionReader
+from steerclear.shield.exceptions import PolicyError
+from steerclear.shield.wrappers.actions import team_answer
 
 KEPT = 5
 """Failures whose text is kept; all are counted."""
@@ -56,16 +58,17 @@ class PolicyRunner:
         """Return the actions of the seat's boats."""
         self._step += 1
         try:
-            answer = self.policy.act(observations, infos)
-            actions = {agent_id: answer[agent_id] for agent_id in self.agent_ids}
-            held = getattr(self.policy, "held", None)  # boats whose guarded code gave nothing usable
-            self._answered = set(self.agent_ids) - set(held if isinstance(held, Mapping) else ())
-            self._own.usable_steps += bool(self._answered)
-            return actions
+            actions, faults = team_answer(self.policy.act(observations, infos), self.agent_ids)
         except Exception as error:  # a user's policy may raise anything
             self._answered = set()
-            self._note(f"{type(error).__name__}: {error}")
+            self._note(str(error) if isinstance(error, PolicyError) else f"{type(error).__name__}: {error}")
             return dict.fromkeys(self.agent_ids, HOLD)
+        for fault in faults.values():
+            self._note(fault)
+        held = getattr(self.policy, "held", None)  # boats whose guarded code gave nothing usable
+        self._answered = set(actions) - set(held if isinstance(held, Mapping) else ())
+        self._own.usable_steps += bool(self._answered)
+        return {agent_id: actions.get(agent_id, HOLD) for agent_id in self.agent_ids}
 
     def mended(self, actions: Mapping[str, Any]) -> dict[str, Any]:
         """Return the seat's part of ``actions`` with a stop in place of each action that the game refuses."""
@@ -97,5 +100,5 @@ class PolicyRunner:
 
     def _note(self, text: str) -> None:
         if not self._own.count:
-            logger.warning("policy failed at step %d: %s; its boats hold", self._step, text)
+            logger.warning("policy failed at step %d: %s; boats without an action stop", self._step, text)
         self._own.add(f"step {self._step}: {text}")

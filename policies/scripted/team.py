@@ -9,6 +9,7 @@ import numpy as np
 from steerclear.env.core import BatchedMctf
 from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.jit import Array, IntArray
+from steerclear.shield.wrappers.actions import check_boats
 
 from .batch import ScriptedBatch
 from .layout import Behaviour
@@ -34,8 +35,8 @@ class BatchTeam:
                 the batch policy does not play.
         """
         self._core = game_core(env)
+        self._boats = boat_numbers(self._core, agent_ids)
         self._ids = list(agent_ids)
-        self._boats = boat_numbers(self._core, self._ids)
         self._team = int(self._core.team[self._boats[0]])
         self._batch.reset(self._core, self._team, seed, self._boats)
 
@@ -84,9 +85,7 @@ def game_core(env: Any) -> BatchedMctf:
 def boat_numbers(core: BatchedMctf, agent_ids: Sequence[str]) -> IntArray:
     """Return the numbers of boats of one team."""
     known = core.config.agent_ids
-    unknown = [agent_id for agent_id in agent_ids if agent_id not in known]
-    if unknown or not agent_ids or len(set(agent_ids)) != len(agent_ids):
-        raise PolicyError(f"agent_ids are {list(agent_ids)}; give different ones of {', '.join(known)}")
+    check_boats(agent_ids, known)
     boats = np.array([known.index(agent_id) for agent_id in agent_ids], dtype=np.int64)
     if np.unique(core.team[boats]).size != 1:
         raise PolicyError(f"agent_ids {list(agent_ids)} are of both teams; one policy plays one team")

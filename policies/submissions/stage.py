@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import difflib
 import re
 import shutil
 import stat
 import tempfile
 import zipfile
 import zlib
+from collections.abc import Iterable
 from multiprocessing.util import Finalize
 from pathlib import Path, PurePosixPath
 
@@ -46,7 +48,7 @@ class Stage:
         if self.source.name == ENTRY_FILE and self.source.is_file():
             self.source = self.source.parent
         if not self.source.exists():
-            raise PolicyError(f"there is no submission at {self.source}; give a folder or a zip with {ENTRY_FILE}")
+            raise PolicyError(no_submission(self.source))
         if not (self.source.is_dir() or self.source.is_file()):  # a pipe may block and a device never end
             raise PolicyError(f"{self.source} is no plain file; give a folder or a zip with {ENTRY_FILE}")
         top = Path(tempfile.mkdtemp(prefix="steerclear-submission-"))
@@ -99,6 +101,24 @@ def link_folder(source: Path, top: Path) -> Path:
     except OSError:
         return source
     return top
+
+
+def near_files(text: str | Path, names: Iterable[str] = ()) -> str:
+    """Return a hint at policies that are called nearly so: files and folders beside that place, then further names."""
+    path = Path(text).expanduser()
+    try:
+        beside = [one for one in path.parent.iterdir() if one.suffix in (".py", ".zip") or (one / ENTRY_FILE).is_file()]
+    except OSError:
+        beside = []
+    called = {name: str(one) for one in sorted(beside) for name in (one.stem, one.name)}
+    near = [called[name] for name in difflib.get_close_matches(path.name, called, n=3, cutoff=0.75)]
+    found = dict.fromkeys([*near, *names])
+    return f"did you mean {', '.join(found)}? " if found else ""
+
+
+def no_submission(path: str | Path) -> str:
+    """Return the words for a path at which nothing is."""
+    return f"there is no submission at {path}; {near_files(path)}give a folder or a zip with {ENTRY_FILE}"
 
 
 def unpack(archive: Path, top: Path, max_bytes: int) -> None:

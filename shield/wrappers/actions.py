@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, TypeGuard
 import numpy as np
 
 from ..arrays import NoNumbersError, holds_bools, numbers
-from ..exceptions import GameError
+from ..exceptions import GameError, PolicyError
 from ..jit import Array
 
 HEADINGS_DEG = (180.0, 135.0, 90.0, 45.0, 0.0, -45.0, -90.0, -135.0)
@@ -50,6 +50,37 @@ def check_agents(actions: Any, agent_ids: Sequence[str]) -> None:
     for agent_id in actions:
         if agent_id not in agent_ids:
             raise GameError(f"unknown agent {agent_id!r} in the actions; agents are {', '.join(agent_ids)}")
+
+
+def check_boats(agent_ids: Sequence[str], known: Sequence[str]) -> None:
+    """Check that these are different boats of the game (PolicyError)."""
+    if isinstance(agent_ids, str):
+        raise PolicyError(f"agent_ids is the text {agent_ids!r}; give a list of boats: [{agent_ids!r}]")
+    if not agent_ids or len(set(agent_ids)) != len(agent_ids) or not set(agent_ids) <= set(known):
+        raise PolicyError(f"agent_ids are {list(agent_ids)}; give different ones of {', '.join(known)}")
+
+
+def team_answer(answer: Any, agent_ids: Sequence[str]) -> tuple[dict[str, Any], dict[str, str]]:
+    """Split what a team policy's ``act`` answered.
+
+    Returns:
+        The actions of the team's boats that have one, and what is wrong, by boat: a boat without an action, or a name
+        that is none of the team's boats, whose action counts for nothing.
+
+    Raises:
+        PolicyError: the answer is no mapping of boat to action.
+    """
+    if not isinstance(answer, Mapping):
+        example = f"{{{agent_ids[0]!r}: 4, ...}}" if agent_ids else "{}"
+        raise PolicyError(f"act answered {short(answer, 40)}; return a dict of boat to action, such as {example}")
+    actions = {agent: answer[agent] for agent in agent_ids if agent in answer}
+    faults = {agent: f"no action for {agent}" for agent in agent_ids if agent not in answer}
+    faults |= {
+        str(name): f"an action for {short(name, 40)}, which is no boat of this team ({', '.join(agent_ids)})"
+        for name in answer
+        if name not in agent_ids
+    }
+    return actions, faults
 
 
 def read_action(seat: Seat, action: Any) -> Command:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,10 +14,13 @@ from ..exceptions import ConfigError, FleetError, PolicyError
 from ..fleet import Fleet
 from ..platforms import layout as L
 from ..shield import Shield
+from .actions import team_answer
 from .checks import Serving, ShieldedGame, one_game_shield, words_of
 from .readers import GameReader, reader_of
 
 logger = logging.getLogger(__name__)
+STOPPED = (0.0, 0.0)
+"""What `steerclear.policies` answers for a boat whose code gave nothing usable, and names in ``held``."""
 
 
 class ShieldedTeamPolicy:
@@ -49,6 +52,7 @@ class ShieldedTeamPolicy:
         self._game: ShieldedGame | None = None
         self._agent_ids: tuple[str, ...] = ()
         self._shown: tuple[float, Any] | None = None
+        self._said: set[str] = set()
 
     def reset(self, env: Any, agent_ids: Sequence[str], seed: int) -> None:
         """Begin a game.
@@ -63,17 +67,20 @@ class ShieldedTeamPolicy:
         reader.check_answers(agent_ids)
         self._game = ShieldedGame(self.shield, reader, team, False, self.keep_out, held=True)
         self.shield, self._agent_ids, self._shown = self._game.shield, tuple(agent_ids), None
+        self._said.clear()
         self._game.begin()
         self.policy.reset(env, agent_ids, seed)
 
     def act(self, observations: Mapping[str, Any], infos: Mapping[str, Any]) -> dict[str, Any]:
         """Return the boats' actions. Those that the shield changed are (speed m/s, relative heading deg) pairs.
 
+        A boat without an action, or whose foreign code gave none that can be used, is held (`Reason.HELD`).
+
         Exceptions of the policy itself pass through: the caller decides what to send then.
 
         Raises:
             PolicyError: `reset` has not been called, another game is played than the one given to it, or the policy's
-                answer is no mapping.
+                answer is no mapping of boat to action.
             GameError: an answer is no action: not finite, True or False, of another length, or an unknown field point.
             ConfigError: the env's settings have changed since the reset, or the shield has begun to serve someone else.
         """
@@ -82,14 +89,13 @@ class ShieldedTeamPolicy:
         reader = self._game.reader
         self._game.check()
         self._check_played(reader.moment(), observations)
-        answer = self.policy.act(observations, infos)
-        if not isinstance(answer, Mapping):
-            raise PolicyError(
-                f"the policy answered {type(answer).__name__}; let act return a mapping of boat to action"
-            )
+        actions, faults = team_answer(self.policy.act(observations, infos), self._agent_ids)
+        self._say(faults)
         reader.check_answers(self._agent_ids)
-        actions = dict(answer)
-        self.decisions = self._game.decide(reader.commands(actions))
+        commands = np.array(reader.commands(actions))
+        for agent in self._unanswered(actions):
+            commands[reader.agent_ids.index(agent)] = np.nan
+        self.decisions = self._game.decide(commands)
         actions = reader.playable(actions)
         for agent in self._agent_ids:
             i = reader.agent_ids.index(agent)
@@ -100,6 +106,22 @@ class ShieldedTeamPolicy:
 
     def __repr__(self) -> str:
         return f"<{self.name}: {words_of(self.shield)}>"
+
+    def _unanswered(self, actions: Mapping[str, Any]) -> Iterator[str]:
+        """Yield the boats without an action of the policy's own: foreign code is answered for with a stop."""
+        held = getattr(self.policy, "held", None)
+        for agent in self._agent_ids:
+            action = actions.get(agent)
+            stopped = isinstance(action, tuple) and action == STOPPED
+            if agent not in actions or (stopped and isinstance(held, Mapping) and agent in held):
+                yield agent
+
+    def _say(self, faults: Mapping[str, str]) -> None:
+        """Log what is wrong with an answer, each thing once a game."""
+        for fault in faults.values():
+            if fault not in self._said:
+                self._said.add(fault)
+                logger.warning("%s: %s; boats without an action hold", self.name, fault)
 
     def _check_played(self, moment: float, observations: Mapping[str, Any]) -> None:
         """Refuse to play if the observations change while the game that is read stands still.
@@ -124,6 +146,8 @@ class ShieldedTeamPolicy:
 
 def _team_of(reader: GameReader, agent_ids: Sequence[str]) -> int:
     """Return the team of the boats, which must be the same for all."""
+    if isinstance(agent_ids, str):
+        raise ConfigError(f"agent_ids is the text {agent_ids!r}; give a list of boats: [{agent_ids!r}]")
     for agent in agent_ids:
         if agent not in reader.agent_ids:
             raise ConfigError(f"unknown boat {agent!r}; the game has {', '.join(reader.agent_ids)}")

@@ -1,6 +1,9 @@
 """Observations and the global state, against a plain description of what a boat sees."""
 
 import math
+import re
+from dataclasses import fields
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +17,36 @@ from steerclear.env.mctf import MctfEnv
 from steerclear.env.observation_layout import pack_lines, sight_of_line, sight_of_point
 from steerclear.env.obstacles import closest_on_segment
 from steerclear.env.trace import load_trace
+from steerclear.env.view import GameView
 from steerclear.shield.exceptions import GameError
+
+
+def test_the_page_names_every_number_at_its_index():
+    page = (Path(__file__).parents[2] / "docs" / "policies.md").read_text(encoding="utf-8")
+    table = page.partition("<!-- observation -->")[2].partition("<!-- /observation -->")[0]
+    core = BatchedMctf("aamas2024")
+    entries = re.findall(r"`(\w+)`", table.partition('("teammate_0", entry)')[2].partition("| as above |")[0])
+    covered = []
+    for row in table.splitlines()[3:]:
+        numbers = [int(number) for number in re.findall(r"\d+", row.split("|")[1])]
+        first, last, named = numbers[0], numbers[-1], re.findall(r"`([^`]+)`", row.split("|")[2])
+        keys = core.observation_keys[first : last + 1]
+        covered += range(first, last + 1)
+        if "entry" in row.split("|")[2]:
+            boats = [name.split('"')[1] for name in named]
+            assert [boats[0], boats[-1]] == [keys[0][0], keys[-1][0]]
+            assert [entry for _, entry in keys] == entries * (len(keys) // len(entries))
+        else:
+            assert [named[0], named[-1]] == [keys[0], keys[-1]]
+            assert set(named) <= set(keys)
+    assert covered == list(range(core.n_obs)) == list(range(61))
+    assert core.tagging_cooldown_s.max() <= core.config.tagging_cooldown_s == 10.0
+    assert "`mctf2026` has 67" in page
+    game = BatchedMctf("mctf2026")
+    assert game.n_obs == 67
+    assert game.rules.corners.tolist() == [[[0.0, 80.0], [0.0, 0.0]], [[160.0, 80.0], [160.0, 0.0]]]
+    documented = set(re.findall(r"^        (\w+):", GameView.__doc__, flags=re.M))
+    assert documented == {field.name for field in fields(GameView)}
 
 
 def test_keys_are_those_of_the_recorded_games(traces):

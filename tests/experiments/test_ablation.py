@@ -33,6 +33,7 @@ from steerclear.experiments.tables import (
     measured_text,
     number_text,
     pairing_table,
+    verdict_of,
 )
 from steerclear.shield.exceptions import ConfigError
 
@@ -95,7 +96,10 @@ def test_both_figures_are_in_results_tables_and_pages_and_goals_are_of_the_first
     assert undocumented(content, KEYS["ablate"]) == []
     assert "covered − off, paired" in (run.folder / "report.html").read_text()
     (page,) = (path for path in write_pages([content], tmp_path / "docs") if path.name == "ablation_aamas2024.md")
-    assert "| shield off | shield on | on - off, paired | covered | covered - off, paired |" in page.read_text()
+    assert (
+        "| shield off | on, left to the game | on - off, paired | on, covered | covered - off, paired |"
+        in page.read_text()
+    )
 
 
 def hits(row, off, on):
@@ -161,7 +165,23 @@ def test_hits_of_boats_that_the_game_drives_stand_beside_the_goals_and_miss_none
     assert (told["value"], told["met"]) == (0.25, False)
     one_more = [{**row, "breaches_teammate_2.5m": row["breaches_teammate_2.5m"] + row["shielded"]} for row in rows]
     assert (goals(one_more)[0]["value"], goals(one_more)[0]["met"]) == (4.0, False)
-    assert all("note" not in goal for goal in goals(played.rows)), "none is driven in three seconds"
+    assert not any("drives" in goal.get("note", "") for goal in goals(played.rows)), "none is driven in three seconds"
+
+
+def test_a_goal_says_what_its_ratio_rests_on_and_whether_its_interval_tells(played):
+    rows = [{**hits(row, 10, 3), "captures": 1 if row["game"] == 0 else 0} for row in played.rows]
+    opponents, captures = goals(rows)[1:3]
+    assert captures["note"] == "2 off, 2 on in 4 games each"
+    assert opponents["note"] == "40 off, 12 on in 4 games each"
+    few = {**captures, "value": 1.0, "low": 0.01, "high": 78.0, "met": True}
+    assert "(2 off, 2 on in 4 games each) 1.00 [0.01, 78] >= 0.90 met (too few to tell)" in " ".join(
+        printed(goals_table([few]), 100).split()
+    )
+    assert goals_lines([few])[2].endswith("| met (too few to tell) |")
+    assert goal_rows([few])[0]["verdict"] == "met (too few to tell)"
+    assert verdict_of({**few, "met": False, "low": 0.5}) == ("not met (too few to tell)", "yellow")
+    assert verdict_of({**few, "low": 0.9}) == verdict_of({**few, "low": None}) == ("met", "green")
+    assert verdict_of({**few, "met": None}) == ("no data", "yellow")
 
 
 def test_results_are_written_whole_and_documented(played, tmp_path):

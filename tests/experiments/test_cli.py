@@ -88,6 +88,10 @@ def test_evaluate_plays_with_or_without_the_shield():
     assert "shield on" not in Path("pages/evaluation_aamas2024.md").read_text()
     assert "shield on" not in off.stdout
     assert "shield off" not in on.stdout
+    assert "on, covered" in on.stdout
+    assert "covered: they are." in " ".join(on.stdout.split())
+    left = run("evaluate", "medium", "--opponents", "hold", *TINY, "--out", "left", "--shield", "--no-shield-autopilot")
+    assert "on, left to the game" in left.stdout
 
 
 ALL_GAME = """

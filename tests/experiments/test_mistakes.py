@@ -30,6 +30,9 @@ def workplace(tmp_path, monkeypatch, game_record):
     Path("list.json").write_text("[1, 2]")
     Path("other.json").write_text(json.dumps({"command": "play", "game": {}}))
     Path("a.zip").write_bytes(b"PK\x05\x06" + bytes(18))
+    Path("mypol.py").write_text("def act(observation):\n    return 4\n")
+    Path("team").mkdir()
+    Path("team", "solution.py").touch()
     save(game_record, "game.npz")
     demo = Path(cli.__file__).parent / "templates" / "demo_fleet.yaml"
     Path("fleet.yaml").write_text(demo.read_text(encoding="utf-8"))

@@ -116,14 +116,44 @@ def test_an_interrupted_run_is_gone_on_with(tmp_path, caplog):
     assert [row["number"] for row in whole.rows] == [0, 1, 2, 3]
 
 
-def test_jobs_of_other_settings_stay_and_count_for_nothing(tmp_path, caplog):
-    execute(experiment("", ""), tmp_path)
-    other = execute(experiment("slow"), tmp_path, resume=True)
-    assert (other.resumed, len(other.rows)) == (0, 1)
-    assert "0 of 1 games are in" in caplog.text
-    assert "2 there are of other settings" in caplog.text
-    more = execute(experiment("", "", ""), tmp_path, resume=True)
+def with_settings(settings, *numbers):
+    return Experiment("test", settings, [{"do": "", "number": k, **settings["play"]} for k in numbers], work)
+
+
+def test_other_settings_are_refused_by_name_and_more_of_the_same_go_on(tmp_path):
+    begun = {"games": 2, "play": {"delay_s": 0.0, "shield": None}}
+    run = execute(with_settings(begun, 0, 1), tmp_path)
+    run.write({"command": "test"})
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    for other, words in (
+        ({"games": 2, "play": {"delay_s": 0.3, "shield": None}}, r"play\.delay_s was 0\.0, is 0\.3\), which"),
+        ({"games": 1, "play": {"delay_s": 0.0, "shield": None}}, r"games was 2, is 1\)"),
+        ({"games": 2, "play": {"shield": "on", "long": "x" * 99}}, r"shield was not set, is on; .*long .*x…"),
+    ):
+        with pytest.raises(ConfigError, match=f"{words}.*give the same settings, or choose another --out"):
+            execute(with_settings(other, *range(other["games"])), tmp_path, resume=True)
+    assert before == {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    more = execute(with_settings({**begun, "games": 3}, 0, 1, 2), tmp_path, resume=True)
     assert (more.resumed, len(more.rows)) == (2, 3)
+    (tmp_path / "rows.jsonl").write_text("")  # results.json alone is worth as much
+    with pytest.raises(ConfigError, match="games was 3, is 2"):
+        execute(with_settings(begun, 0, 1), tmp_path, resume=True)
+
+
+def test_rows_without_their_settings_are_not_replaced(tmp_path):
+    settings = {f"s{k}": k for k in range(6)}
+    execute(Experiment("test", settings, jobs("", ""), work), tmp_path)
+    (tmp_path / "experiment.json").unlink()
+    with pytest.raises(ConfigError, match=r"s0 was not set, is 0; .*; and 2 more\)"):
+        execute(Experiment("test", settings, jobs("slow"), work), tmp_path, resume=True)
+
+
+def test_rows_of_a_policy_whose_files_changed_stay_and_count_for_nothing(tmp_path, caplog):
+    settings = {"own": "mine.py"}
+    execute(Experiment("test", settings, jobs("", ""), work), tmp_path)
+    changed = execute(Experiment("test", settings, jobs("slow"), work), tmp_path, resume=True)
+    assert (changed.resumed, len(changed.rows)) == (0, 1)
+    assert "2 there are of a policy's files before they changed" in caplog.text
 
 
 def lines_of(folder):

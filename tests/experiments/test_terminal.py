@@ -14,6 +14,7 @@ from rich.text import Text
 from steerclear.experiments import cli, markdown, page
 from steerclear.experiments.console import EVERY_S, ExitCode, PlainProgress, time_words
 from steerclear.experiments.start import main
+from steerclear.experiments.tables import titled
 from steerclear.experiments.terminal import SafeConsole, SafeFormatter, plain
 from steerclear.experiments.workers import fault_words, machine_words
 from steerclear.shield.foreign import is_drawn, visible
@@ -144,10 +145,31 @@ def test_what_nobody_foresaw_is_one_line_and_a_file(error, monkeypatch):
     assert machine_words(error) == ""
 
 
-def lines_of(told, at_once=False):
+@pytest.mark.parametrize("width", [80, 72, 60, 40])
+def test_a_table_fits_the_terminal_and_loses_nothing(width):
+    heads = ["", "shield off", "on, left to the game", "on - off, paired"]
+    rows = [[f"figure {k}", f"{k}.25 [-10.1, 12]", "0.00 [0.00, 0.75]", f"-{k}.50 [-2.2, 0.75]"] for k in range(3)]
+    console = SafeConsole(file=io.StringIO(), width=width)
+    console.print(titled("A table", heads, rows))
+    lines = console.file.getvalue().splitlines()
+    assert max(map(len, lines)) <= width
+    shown = " ".join(" ".join(lines).split())
+    assert "…" not in shown
+    words = [word for row in (heads, *rows) for cell in row for word in cell.split()]
+    assert all(shown.count(word) >= 1 for word in words)
+    assert sum(line.startswith("figure 2") for line in lines) == (1 if width >= 60 else 2)
+
+
+def test_long_words_of_a_goal_go_on_in_a_second_line():
+    console = SafeConsole(file=io.StringIO(), width=50)
+    console.print(titled("Goals", ["", "measured", "goal"], [["many words " * 9, "1.0", ">= 2"]], wrap=True))
+    assert console.file.getvalue().count("words") == 9
+
+
+def lines_of(told, at_once=False, least=1):
     """What is printed where (time s, done, words) are told."""
     file, now_s = io.StringIO(), [0.0]
-    plain = PlainProgress("games", 1200, SafeConsole(file=file), at_once, lambda: now_s[0])
+    plain = PlainProgress("games", 1200, SafeConsole(file=file), at_once, least, lambda: now_s[0])
     for time_s, done, words in told:
         now_s[0] = time_s
         plain(done, words)
@@ -155,14 +177,24 @@ def lines_of(told, at_once=False):
 
 
 def test_a_line_comes_now_and_then_with_the_time_that_is_left():
-    told = [(0.0, 200, ""), (EVERY_S - 1.0, 250, ""), (EVERY_S, 300, "net 2"), (EVERY_S + 1.0, 310, "")]
-    assert lines_of(told) == ["games: 300 of 1,200, net 2, about 4 min left"]  # 100 in 30 s, 900 left: 4.5 min
+    told = [(0.0, 200, ""), (10.0, 250, ""), (EVERY_S + 10.0, 300, "net 2"), (EVERY_S + 11.0, 310, "")]
+    assert lines_of(told) == ["games: 300 of 1,200, net 2, about 9 min left"]  # 50 in 30 s, 900 left
     assert [time_words(time_s) for time_s in (40.0, 11_100.0)] == ["40 s", "3 h 5 min"]
 
 
 def test_the_first_is_printed_where_it_is_wanted_and_no_time_is_told_where_none_is_known():
     assert lines_of([(0.0, 0, ""), (1.0, 1, "")], at_once=True) == ["games: 0 of 1,200"]
     assert lines_of([(0.0, 5, ""), (40.0, 5, ""), (80.0, 1200, "")]) == ["games: 5 of 1,200", "games: 1,200 of 1,200"]
+
+
+def test_the_time_left_is_told_once_games_have_a_rate_and_compiling_is_no_part_of_it():
+    told = [(0.0, 0, ""), (130.0, 1, ""), (131.0, 2, ""), (161.0, 3, ""), (191.0, 5, "")]  # compiled for 2 minutes
+    assert lines_of(told, least=2) == [
+        "games: 1 of 1,200",
+        "games: 3 of 1,200, about 5 h 9 min left",
+        "games: 5 of 1,200, about 5 h 4 min left",
+    ]
+    assert lines_of(told[:2]) == ["games: 1 of 1,200"], "one game has no rate"
 
 
 class Loading:

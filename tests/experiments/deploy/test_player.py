@@ -114,6 +114,28 @@ def test_a_boat_without_a_usable_answer_has_no_command_and_the_others_have(
     assert np.isfinite(tagged.commands[1]).all(), "the game drives a tagged boat home whatever its policy does"
 
 
+@pytest.mark.parametrize(
+    ("answer", "held", "words"),
+    [
+        ("{'agent_0': 4, 'agent_2': 4}", [1], ["blue_2: no action for agent_1"]),
+        ("{agent: 4 for agent in self.ids + ['agent_9']}", [], ["agent_9: an action for 'agent_9', which is no boat"]),
+        ("[4, 4, 4]", [0, 1, 2], ["act answered [4, 4, 4]; return a dict of boat to action"] * 3),
+        ("None", [0, 1, 2], ["act answered None; return a dict of boat to action"] * 3),
+    ],
+)
+def test_a_team_that_forgets_a_boat_leaves_it_without_a_command(fleet_of, snapshot_of, tmp_path, answer, held, words):
+    (tmp_path / "mine.py").write_text(
+        "class Team:\n    def reset(self, env, agent_ids, seed):\n        self.ids = list(agent_ids)\n"
+        f"    def act(self, observations, infos):\n        return {answer}\n"
+    )
+    fleet = fleet_of()
+    player = load_player(Orders(cast_of(fleet), f"{tmp_path / 'mine.py'}:Team"))
+    play = player.play(snapshot_of(MctfEnv(game_config(fleet)), fleet))
+    assert np.flatnonzero(np.isnan(play.commands[:3]).any(axis=1)).tolist() == held
+    assert len(play.problems) == len(words)
+    assert all(word in problem for word, problem in zip(words, play.problems, strict=True)), play.problems
+
+
 def test_a_game_that_starts_again_is_a_new_game_for_the_policy(fleet_of, snapshot_of, write_entry):
     entry = write_entry("self.calls += 1\nreturn (1.0, float(self.calls))", start="self.calls = 0")
     player = load_player(Orders(cast_of(fleet_of(1)), entry))
@@ -231,6 +253,20 @@ def test_waypoints_and_hold_steer_the_boat_of_the_page(team, more):
     assert speeds["hold"] == 0.0
 
 
+def test_a_route_of_the_page_is_sailed_in_turn(tmp_path):
+    page = (Path(__file__).parents[3] / "docs" / "your_boat.md").read_text(encoding="utf-8")
+    (tmp_path / "route.py").write_text(page.partition("`route.py`")[2].split("```python\n")[1].split("```")[0])
+    fleet, headings = file_of(), []
+    player = load_player(Orders(cast_of(fleet, policy="route.py:route"), f"{tmp_path / 'route.py'}:route"))
+    for place in ((20.0, 40.0), (20.0, 20.0), (140.0, 20.0), (140.0, 60.0), (20.0, 60.0), (20.0, 20.0)):
+        seen = np.array([[*place, 90.0, 1.0]])
+        play = player.play(Snapshot(0, 0.0, seen))
+        assert play.problems == ()
+        headings.append(round(np.degrees(play.commands[0, 1])) % 360)
+        assert play.commands[0, 0] == pytest.approx(1.0, abs=0.5), "half of its top speed"
+    assert headings == [180, 90, 0, 270, 180, 90]
+
+
 def test_a_boat_that_is_not_seen_goes_on_being_answered_for():
     fleet = file_of()
     player = load_player(Orders(cast_of(fleet, policy="waypoints"), "waypoints"))
@@ -241,5 +277,5 @@ def test_a_boat_that_is_not_seen_goes_on_being_answered_for():
 
 
 def test_a_policy_that_needs_a_game_says_which_do_not():
-    with pytest.raises(FleetFileError, match=f"'medium' needs a game: .*--policy {' or '.join(NEED_NO_GAME)}"):
+    with pytest.raises(FleetFileError, match=f"'medium' needs a game: .*--policy {', '.join(NEED_NO_GAME)} or FILE.py"):
         cast_of(file_of(), policy="medium")

@@ -61,7 +61,9 @@ def test_a_run_says_under_which_conditions_it_was_played(tmp_path, monkeypatch):
     again = run("ablate", *TINY, *GIVEN, "--out", "out", "--resume")
     assert json.loads(Path("out/results.json").read_text())["games_resumed"] == 3, again.output
     calm = run("ablate", *TINY, "--out", "out", "--resume")
-    assert json.loads(Path("out/results.json").read_text())["games_resumed"] == 0, calm.output
+    assert calm.exit_code == ExitCode.BAD_INPUT
+    assert "conditions.delay_s was 0.3, is 0.0" in calm.stderr
+    assert json.loads(Path("out/results.json").read_text())["games_resumed"] == 3, "what is there stays"
     played = run("play", "--opponent", "hold", "--max-time", "2", *GIVEN, "--json", "a.json")
     assert played.exit_code == ExitCode.OK, played.output
     assert keys.undocumented(json.loads(Path("a.json").read_text()), keys.KEYS["play"]) == []

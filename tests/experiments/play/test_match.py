@@ -17,6 +17,7 @@ from steerclear.policies.keyboard import AHEAD, BACK, LEFT, RIGHT
 from steerclear.shield.exceptions import ConfigError
 
 SHORT = {"max_time_s": 6.0}
+OWN = ["agent_0", "agent_1", "agent_2"]
 
 
 def spec_of(own="medium", opponent="easy", **settings):
@@ -83,15 +84,35 @@ def test_a_policy_that_fails_mid_game_does_not_end_it(custom, answer, words, cap
     assert row["opponent_policy_failures"] >= 1
     assert "step 3" in row["first_failure"]
     assert words in row["first_failure"]
-    assert "its boats hold" in caplog.text
+    assert "boats without an action stop" in caplog.text
 
 
-def test_a_policy_that_forgets_a_boat_or_answers_no_dict_holds(custom, caplog):
-    custom["made"] = lambda: type("Short", (Made,), {"act": lambda self, observations, infos: {}})(None)
-    custom["none"] = lambda: type("None_", (Made,), {"act": lambda self, observations, infos: None})(None)
-    row = play_match(spec_of("made", "none")).row
-    assert (row["policy_failures"], row["opponent_policy_failures"]) == (60, 60)
-    assert "KeyError" in row["first_failure"]
+@pytest.mark.parametrize(
+    ("answer", "times", "usable", "words"),
+    [
+        ({"agent_0": 4, "agent_1": 4}, 60, 60, "step 1: no action for agent_2"),
+        ({"agent_1": 4}, 120, 60, "no action for agent_0"),
+        ({}, 180, 0, "no action for agent_0"),
+        ({"agent_0": 4, "agent_1": 4, "agent_2": None}, 60, 60, "agent_2: no answer: the policy returned None"),
+        ({"agent_0": 4, "agent_1": 4, "agent_2": 4, "agent_7": 4}, 60, 60, "an action for 'agent_7', which is no boat"),
+        (None, 60, 0, "act answered None; return a dict of boat to action, such as {'agent_0': 4, ...}"),
+        ([4, 4, 4], 60, 0, "act answered [4, 4, 4]; return a dict of boat to action"),
+        (4, 60, 0, "act answered 4; return a dict"),
+    ],
+)
+def test_a_team_that_forgets_a_boat_or_answers_no_dict_is_told_once_and_the_others_sail(
+    custom, answer, times, usable, words, caplog
+):
+    custom["made"] = lambda: type("Made_", (Made,), {"act": lambda self, observations, infos: answer})(None)
+    result = play_match(spec_of("made", "hold"))
+    row, speed = result.row, result.record["speed_mps"]
+    assert (row["policy_failures"], row["policy_usable_steps"]) == (times, usable)
+    assert words in row["first_failure"]
+    assert "Error" not in row["first_failure"]
+    assert len([one for one in caplog.messages if "policy failed" in one]) == 1
+    if isinstance(answer, dict):
+        for boat, name in enumerate(OWN):
+            assert (speed[-1, boat] > 1.0) == (answer.get(name) == 4)
 
 
 def test_a_watcher_may_end_the_game():

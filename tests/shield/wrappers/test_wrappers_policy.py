@@ -168,20 +168,78 @@ def test_a_function_that_fails_is_answered_for_in_its_own_frame(caplog):
     assert sum("answers again" in record.message for record in caplog.records) == 2
 
 
-def test_a_policy_that_answers_nothing_is_told_what_to_answer():
-    class Silent:
-        def reset(self, env, agent_ids, seed):
-            pass
+class Always:
+    """A team that always gives the same answer."""
 
-        def act(self, observations, infos):
-            return None
+    def __init__(self, answer):
+        self.answer = answer
 
-    env, start = crowd()
-    env.reset(seed=1, options=start)
-    team = Shield().wrap(Silent())
+    def reset(self, env, agent_ids, seed):
+        pass
+
+    def act(self, observations, infos):
+        return self.answer
+
+
+def begun(policy):
+    """A wrapped policy in a game, and what it sees first."""
+    env, _ = crowd()
+    seen = env.reset(seed=1)
+    team = Shield().wrap(policy)
     team.reset(env, OWN, 0)
-    with pytest.raises(PolicyError, match="answered NoneType; let act return a mapping"):
-        team.act({}, {})
+    return env, team, seen
+
+
+@pytest.mark.parametrize(("answer", "words"), [(None, "None"), ([4, 4, 4], r"\[4, 4, 4\]"), (4, "4")])
+def test_a_policy_that_answers_no_dict_is_told_what_to_answer(answer, words):
+    _, team, seen = begun(Always(answer))
+    with pytest.raises(PolicyError, match=f"act answered {words}; return a dict of boat to action, such as"):
+        team.act(*seen)
+
+
+def test_a_boat_without_an_action_is_held_and_what_is_said_of_other_boats_counts_for_nothing(caplog):
+    env, team, seen = begun(Always({"agent_0": 4, "agent_2": 4, "agent_3": 4, 7: 4}))
+    for _ in range(2):
+        actions = team.act(*seen)
+        seen = env.step(actions)[0], {}
+        assert [team.decisions[agent].reason for agent in ("agent_1", "agent_0")] == [Reason.HELD, Reason.PASSED]
+        assert set(actions) == set(OWN)
+        assert actions["agent_1"][0] == 0.0
+    told = [message.partition(": ")[2] for message in caplog.messages]
+    assert told == [
+        f"{words}; boats without an action hold"
+        for words in (
+            "no action for agent_1",
+            "an action for 'agent_3', which is no boat of this team (agent_0, agent_1, agent_2)",
+            "an action for 7, which is no boat of this team (agent_0, agent_1, agent_2)",
+        )
+    ]
+
+
+@pytest.mark.parametrize("bad", [float("nan"), None, 99, ValueError])
+def test_foreign_code_without_a_usable_answer_is_held_and_the_reason_says_so(bad):
+    calls = iter(range(99))
+
+    def function(observation):
+        if next(calls) % 3 != 1:
+            return 4
+        if bad is ValueError:
+            raise ValueError
+        return bad
+
+    _, team, seen = begun(policies.from_callable(function))
+    actions = team.act(*seen)
+    assert [team.decisions[agent].reason.name for agent in OWN] == ["PASSED", "HELD", "PASSED"]
+    assert actions["agent_1"][0] == 0.0
+    assert team.report().held == 1
+
+
+def test_one_boat_s_name_in_place_of_a_list_is_named():
+    env, _ = crowd()
+    words = r"the text 'agent_0'; give a list of boats: \['agent_0'\]"
+    for team in (straight(), policies.make("medium"), policies.make("ohto"), Shield().wrap(straight())):
+        with pytest.raises((PolicyError, ConfigError), match=words):
+            team.reset(env, "agent_0", 0)
 
 
 def test_a_function_that_fails_at_first_is_answered_in_absolute_headings_and_its_loop_can_go_on():
