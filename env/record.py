@@ -131,7 +131,7 @@ class GameRecorder:
     """Collects a game step by step.
 
     Example:
-        ``recorder.start(env.view(), meta)``, after each step ``recorder.step(env.view(), wanted, sent)``,
+        ``recorder.start(env.view(), meta)``, after each step ``recorder.step(env.view(), nominal, filtered)``,
         at the end ``save(recorder.finish(breaches), "game.npz")``.
     """
 
@@ -153,8 +153,8 @@ class GameRecorder:
     def step(
         self,
         view: Any,
-        wanted: np.ndarray,
-        sent: np.ndarray,
+        nominal: np.ndarray,
+        filtered: np.ndarray,
         reason: np.ndarray | None = None,
         intervened: np.ndarray | None = None,
         safety_margin_m: np.ndarray | None = None,
@@ -163,8 +163,8 @@ class GameRecorder:
 
         Args:
             view: The game's state after the step.
-            wanted: (n, 2) nominal commands before the step: speed m/s, absolute heading deg.
-            sent: (n, 2) likewise, the commands that the boats received.
+            nominal: (n, 2) nominal commands before the step: speed m/s, absolute heading deg.
+            filtered: (n, 2) likewise, the commands that the boats received.
             reason: (n,) reason codes; None: all ``NOT_COVERED``.
             intervened: (n,) bool; None: all False.
             safety_margin_m: (n,) safety margins, m; None: all NaN.
@@ -176,8 +176,8 @@ class GameRecorder:
             raise TraceError("no game is being recorded. Call start() before step().")
         n = len(self._meta["agent_ids"])
         given = {
-            "wanted": wanted,
-            "sent": sent,
+            "nominal": nominal,
+            "filtered": filtered,
             "reason": np.full(n, NOT_COVERED) if reason is None else reason,
             "intervened": np.zeros(n, bool) if intervened is None else intervened,
             "safety_margin_m": np.full(n, np.nan) if safety_margin_m is None else safety_margin_m,

@@ -13,13 +13,15 @@ array                shape           contents
 ``is_disabled``      (T+1, n)        bool, stopped by a power play; older files have none
 ``flag_position``    (T+1, 2, 2)     m, flag of team 0 and of team 1
 ``captures``         (T+1, 2)        captures made by each team so far
-``wanted``           (T, n, 2)       nominal command: speed m/s, absolute heading deg
-``sent``             (T, n, 2)       command that the boat received
+``nominal``          (T, n, 2)       nominal command: speed m/s, absolute heading deg
+``filtered``         (T, n, 2)       command that the boat received
 ``reason``           (T, n)          shield reason code; ``NOT_COVERED`` where no shield decided
 ``intervened``       (T, n)          bool, the two commands differ
 ``safety_margin_m``  (T, n)          float32, NaN where there is none
 ``breaches``         (K, 4)          index of the first state inside, boat a, boat b, closest distance m
 ===================  ==============  =======================================================================
+
+``wanted`` and ``sent`` are the names of ``nominal`` and ``filtered`` in files of 0.9.0 and before, which are read.
 """
 
 from __future__ import annotations
@@ -32,6 +34,7 @@ from typing import Any
 
 import numpy as np
 from steerclear.shield.exceptions import TraceError
+from steerclear.shield.renamed import warn
 
 from .whole_file import check_finite, check_shapes, read_arrays, save_arrays
 
@@ -50,8 +53,8 @@ LAYOUT: dict[str, tuple[tuple[str | int, ...], Any]] = {
     "is_disabled": (("T+1", "n"), np.bool_),
     "flag_position": (("T+1", 2, 2), np.float64),
     "captures": (("T+1", 2), np.int64),
-    "wanted": (("T", "n", 2), np.float64),
-    "sent": (("T", "n", 2), np.float64),
+    "nominal": (("T", "n", 2), np.float64),
+    "filtered": (("T", "n", 2), np.float64),
     "reason": (("T", "n"), np.uint8),
     "intervened": (("T", "n"), np.bool_),
     "safety_margin_m": (("T", "n"), np.float32),
@@ -61,6 +64,9 @@ LAYOUT: dict[str, tuple[tuple[str | int, ...], Any]] = {
 
 ARRAYS = tuple(LAYOUT)
 """Names of the arrays besides ``meta``."""
+
+RENAMED = {"wanted": "nominal", "sent": "filtered"}
+"""Names of arrays in 0.9.0 and before."""
 
 LATER = ("is_disabled",)
 """Arrays that files of older versions lack; `load` and `make_record` fill them in."""
@@ -114,7 +120,7 @@ def validate(record: Mapping[str, np.ndarray]) -> None:
     for name, (_, kind) in layout.items():
         if not np.can_cast(record[name].dtype, kind, "same_kind"):
             raise TraceError(f"the record's {name} holds {record[name].dtype}, expected {np.dtype(kind)}")
-    n, steps, breaches = len(meta["agent_ids"]), len(record["wanted"]), record["breaches"]
+    n, steps, breaches = len(meta["agent_ids"]), len(record["nominal"]), record["breaches"]
     sizes = {"T": steps, "T+1": steps + 1, "n": n, "K": len(breaches)}
     check_shapes(record, {name: axes for name, (axes, _) in layout.items()}, sizes, "the record's ", _AGAIN)
     finite = ("position", "heading_deg", "speed_mps", "flag_position", "breaches")
@@ -134,6 +140,7 @@ def make_record(meta: Mapping[str, Any], **arrays: Any) -> Record:
     Raises:
         TraceError: An array is missing, unknown, or does not fit the others.
     """
+    arrays = _renamed(arrays)
     unknown = sorted(set(arrays) - set(ARRAYS))
     if unknown:
         raise TraceError(f"a record has no array {', '.join(unknown)}; it has {', '.join(ARRAYS)}.")
@@ -152,6 +159,7 @@ def save(record: Mapping[str, np.ndarray], path: str | os.PathLike[str]) -> Path
     Raises:
         TraceError: The record is incomplete, or the folder cannot be written to.
     """
+    record = _renamed(record)
     validate(record)
     target = Path(path)
     if target.suffix != ".npz":
@@ -166,7 +174,7 @@ def load(path: str | os.PathLike[str]) -> Record:
     Raises:
         TraceError: The file is missing, cut, not a record, or lacks an array.
     """
-    record = read_arrays(path, "record", _AGAIN)
+    record = _renamed(read_arrays(path, "record", _AGAIN))
     try:
         validate(record)
     except TraceError as error:
@@ -174,9 +182,24 @@ def load(path: str | os.PathLike[str]) -> Record:
     return _filled(record)
 
 
+class _Renamed(dict[str, np.ndarray]):
+    """A record that also answers the old names of its arrays, with a warning."""
+
+    def __missing__(self, name: str) -> np.ndarray:
+        if name not in RENAMED:
+            raise KeyError(name)
+        warn(name, RENAMED[name], stacklevel=2)
+        return self[RENAMED[name]]
+
+
+def _renamed(record: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the arrays under their present names."""
+    return {RENAMED.get(name, name): values for name, values in record.items()}
+
+
 def _filled(record: Record) -> Record:
     """Add the arrays that older versions did not write; no boat was disabled then."""
-    return {"is_disabled": np.zeros_like(record["is_tagged"]), **record}
+    return _Renamed({"is_disabled": np.zeros_like(record["is_tagged"]), **record})
 
 
 def plain(value: Any) -> Any:

@@ -91,7 +91,7 @@ class AblationSettings:
 
     @property
     def radii_m(self) -> tuple[float, ...]:
-        """Radii at which breaches are counted, m: the usual two and the shield's own."""
+        """Radii at which separation violations are counted, m: the usual two and the shield's own."""
         return tuple(sorted({*RADII_M, self.separation_m}))
 
     def specs(self) -> list[MatchSpec]:
@@ -267,7 +267,7 @@ def replay_of(
 
 
 def most_instructive(table: pd.DataFrame, separation_m: float) -> tuple[Row, Row] | None:
-    """The pair of games, off and on, with the most breaches when unshielded, in blue where there are any; or None."""
+    """The pair of games, off and on, with the most hits when unshielded, in blue where there are any; or None."""
     pairs = pairs_of(table)
     if pairs.empty:
         return None

@@ -71,7 +71,7 @@ def deadlocks(speed_mps: Array, wanted_mps: Array, own: BoolArray, longest: int,
 
     Args:
         speed_mps: (T, B, n) speed after each step of B games.
-        wanted_mps: (T, B, n) speed wanted in it, before a shield.
+        wanted_mps: (T, B, n) nominal speed in it, before a shield.
         own: (n,).
         longest: steps that are still no deadlock.
         out: (B,) written.
@@ -97,7 +97,7 @@ def deadlocks(speed_mps: Array, wanted_mps: Array, own: BoolArray, longest: int,
 
 
 def count_deadlocks(speed_mps: Array, wanted_mps: Array, own: BoolArray, dt_s: float) -> int:
-    """Count the deadlocks of one game's own boats (n,), from speeds after and wanted in each step (T, n)."""
+    """Count the deadlocks of one game's own boats (n,), from speeds after each step and nominal speeds in it (T, n)."""
     speed, wanted = (np.ascontiguousarray(one[:, None], dtype=np.float64) for one in (speed_mps, wanted_mps))
     found = np.empty(1)
     deadlocks(speed, wanted, np.ascontiguousarray(own), round(DEADLOCK_S / dt_s), found)
@@ -189,7 +189,7 @@ def tally(
         "clean_games": not any(columns[breach_column(kind, min(radii_m))] for kind in KINDS),
         "collisions": scored_collisions(record, meta, side),
         **shield_columns(record, own, dt_s),
-        "deadlocks": count_deadlocks(record["speed_mps"][1:], record["wanted"][..., 0], own, dt_s),
+        "deadlocks": count_deadlocks(record["speed_mps"][1:], record["nominal"][..., 0], own, dt_s),
         **{one.column: one.measure(record, side) for one in game_metrics_of(radii_m) if one.measure is not None},
     }
 
@@ -208,10 +208,10 @@ def scored_collisions(record: Record, meta: Mapping[str, Any], side: int) -> int
 def shield_columns(record: Record, own: NDArray[np.bool_], dt_s: float) -> dict[str, Any]:
     """Describe what the shield did to the boats ``own`` (n,): shares, mean changes, reversals.
 
-    A changed step is one boat's command in one step that was sent otherwise than wanted. Means are over the
-    changed steps, None where there are none.
+    A changed step is one boat's in which its filtered command differs from the nominal one. Means are over the changed
+    steps, None where there are none.
     """
-    wanted, sent = record["wanted"][:, own], record["sent"][:, own]
+    wanted, sent = record["nominal"][:, own], record["filtered"][:, own]
     covered = int((record["reason"][:, own] != NOT_COVERED).sum())
     changed = record["intervened"][:, own]
     turned_deg = np.abs(heading_change_deg(sent[..., 1], wanted[..., 1]))[changed]

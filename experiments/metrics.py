@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from steerclear.env.record import Record
 
 RADII_M = (2.5, 4.0)
-"""Radii at which breaches are always counted: the shield's default and the `mctf2025` game's own."""
+"""Radii at which separation violations are always counted: the shield's default and the `mctf2025` game's own."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ def game_metrics_of(radii_m: Sequence[float] = RADII_M) -> list[Metric]:
     """Every figure of games, in the order of the tables.
 
     Args:
-        radii_m: at which breaches were counted.
+        radii_m: at which separation violations were counted.
     """
     mates = "entries of two own boats into that radius, per pair"
     opponents = "entries of an own boat and an opponent into that radius, per pair"

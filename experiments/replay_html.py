@@ -102,7 +102,7 @@ def pack(record: Record, title: str) -> dict[str, Any]:
     # a command counts where speed and heading are finite
     wanted, sent = (
         np.where(np.isfinite(one).all(axis=-1, keepdims=True), one, np.nan)
-        for one in (record["wanted"], record["sent"])
+        for one in (record["nominal"], record["filtered"])
     )
     limits = span(np.stack([wanted[..., 0], sent[..., 0]]))
     packer.add_numbers("wanted_speed", wanted[..., 0].T, "previous", limits)
@@ -117,7 +117,7 @@ def pack(record: Record, title: str) -> dict[str, Any]:
     return {
         "title": title,
         "meta": page_meta(record),
-        "steps": len(record["wanted"]),
+        "steps": len(record["nominal"]),
         "columns": packer.columns,
         "breaches": np.round(record["breaches"], 3).tolist(),
         "captures": [[int(step), *map(int, record["captures"][step])] for step in (0, *changed)],
@@ -186,7 +186,7 @@ def at_one_radius(records: Sequence[Record]) -> list[Record]:
 
 
 def own_team(metas: Sequence[Mapping[str, Any]]) -> int:
-    """Return the team whose breaches count: that of the first shielded boat in any game, else blue."""
+    """Return the team whose separation violations count: that of the first shielded boat in any game, else blue."""
     for meta in metas:
         for name, team in zip(meta["agent_ids"], meta["team"], strict=True):
             if name in meta["shielded"]:
@@ -231,12 +231,12 @@ def save_record(record: Record, path: Path, at_s: float | None = None, speedup: 
 
     if ending == ".png":
         return save_frame(record, _closest_step(record) if at_s is None else _step_at(record, at_s), path)
-    with progress(ending[1:], len(record["wanted"])) as notice:
+    with progress(ending[1:], len(record["nominal"])) as notice:
         return save_animation(record, path, speedup=speedup, progress=notice)
 
 
 def _step_at(record: Record, at_s: float) -> int:
-    dt_s, steps = float(read_meta(record)["dt_s"]), len(record["wanted"])
+    dt_s, steps = float(read_meta(record)["dt_s"]), len(record["nominal"])
     if not -0.5 * dt_s <= at_s <= (steps + 0.5) * dt_s:
         raise ConfigError(f"--at is {at_s:g}; the game has 0 to {steps * dt_s:g} s")
     return min(max(round(at_s / dt_s), 0), steps)

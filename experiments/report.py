@@ -340,7 +340,7 @@ def _verdict_table(pairing: Summary) -> Table:
 
 
 def _breaches_table(breaches: Sequence[Mapping[str, Any]]) -> Table:
-    """The judged breaches, avoidable ones of shielded games first, the first `MOST_BREACHES` of them."""
+    """The judged hits, avoidable ones of shielded games first, the first `MOST_BREACHES` of them."""
     order = sorted(breaches, key=lambda breach: (not breach["shielded"], breach["verdict"] != "avoidable"))
     rows = []
     for breach in order[:MOST_BREACHES]:

@@ -79,7 +79,7 @@ def figures_table(title: str, metrics: Iterable[Mapping[str, Any]], columns: Map
 
 
 def verdict_table(summary: Mapping[str, Any]) -> Group | None:
-    """What the post-hoc analysis says about a pairing's breaches; None where it was not asked."""
+    """What the post-hoc analysis says about a pairing's hits; None where it was not asked."""
     rows = verdict_rows(summary.get("verdicts") or {}, interval_text)
     seldom = [SHORT_HEADS.index(head) for head in ("inside", "unjudged")]
     shown = [k for k in range(len(SHORT_HEADS)) if k not in seldom or any(row[k] not in ("0", "-") for row in rows)]
@@ -216,7 +216,7 @@ def measured_text(goal: Mapping[str, Any]) -> str:
 
 
 def game_table(row: Mapping[str, Any], radii_m: Sequence[float]) -> Group:
-    """A single game: its row, and the radii at which breaches were counted, m."""
+    """A single game: its row, and the radii at which hits were counted, m."""
     state = "shielded" if row["shielded"] else "not shielded"
     title = f"{row['pairing']}, {row['side']} {state}, {row['duration_s']:g} s"
     shown: dict[str, Any] = {}

@@ -20,7 +20,7 @@ from .oracle import AT_ONCE, BreachVerdict, Motion, Outcome, Responsible, Verdic
 from .statistics import count_interval
 
 JUDGE = ("all", "shielded", "none")
-"""Whose breaches the oracle judges: in every game, in games whose own team is shielded, in none."""
+"""Whose separation violations are judged: in every game, in games whose own team is shielded, in none."""
 MOST_JUDGED = 500
 """Breaches of one game beyond this many are not judged."""
 NOT_JUDGED = "not_judged"
@@ -67,7 +67,7 @@ class StateLog:
 def helpless(verdict: Verdict, disabled: np.ndarray | None) -> bool:
     """Whether a boat was disabled (T, n; None: nobody knows) from the last moment on at which it could have acted.
 
-    The oracle steers boats as if each obeyed; and before it was disabled nobody could know that it would be.
+    The analysis steers boats as if each obeyed; and before it was disabled nobody could know that it would be.
     """
     if verdict.last_step is None or disabled is None or verdict.last_step >= verdict.step:
         return False
@@ -77,7 +77,7 @@ def helpless(verdict: Verdict, disabled: np.ndarray | None) -> bool:
 def judge_game(
     log: StateLog, params: np.ndarray, record: Record, side: int, motion: Motion = AT_ONCE
 ) -> list[dict[str, Any]]:
-    """Judge the breaches of a game that a team's boats were in, at the record's separation radius.
+    """Judge the separation violations of a game that a team's boats were in, at the record's separation radius.
 
     Args:
         log: the game's states.
@@ -157,7 +157,7 @@ HEADS = (
     *("", "hits", "game-controlled", "avoidable", "unavoidable", "started inside", "not judged", "avoidable per game"),
 )
 SHORT_HEADS = ("", "hits", "game-controlled", "avoid.", "unavoid.", "inside", "unjudged", "avoidable/game")
-"""Game-controlled hits are those whose own boats the game drove: part of the hits, with verdicts like the others."""
+"""Heads of the terminal's table; game-controlled hits are those, of all, whose own boats the game drove."""
 
 
 def verdict_columns(breaches: Sequence[Row] | None, radius_m: float) -> dict[str, int | None]:
@@ -180,7 +180,7 @@ def summarise_verdicts(rows: Sequence[Row]) -> dict[str, Any]:
 
     Returns:
         Per shield state off, on and, where there are such games, covered: ``games`` and ``games_judged``; per kind the
-        number of breaches per outcome, ``breaches``, ``game_controlled`` (those of boats that the game drove),
+        number of violations per outcome, ``breaches``, ``game_controlled`` (those of boats that the game drove),
         ``avoidable_per_game`` (value, low, high; None when no game was judged) and ``responsible`` (number per side).
     """
     summary = {}
@@ -217,7 +217,7 @@ def _number(breaches: Sequence[Row], kind: str, verdict: str) -> int:
 
 
 def all_breaches(rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """List the breaches of all judged games, each with the game it happened in."""
+    """List the separation violations of all judged games, each with the game it happened in."""
     named = ("pairing", "game", "shielded")
     return [
         {**{name: row[name] for name in named}, "state": state_of(row), **breach}

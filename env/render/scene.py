@@ -177,8 +177,8 @@ class Scene:
 
         The last state shows the last command.
         """
-        commanded = min(step, len(record["wanted"]) - 1)
-        commands = ("wanted", "sent", "reason", "intervened", "safety_margin_m")
+        commanded = min(step, len(record["nominal"]) - 1)
+        commands = ("nominal", "filtered", "reason", "intervened", "safety_margin_m")
         overlay = None if commanded < 0 else Overlay(*(record[name][commanded] for name in commands))
         trail_m = record["position"][max(0, step - round(TRAIL_S / dt_s)) : step + 1]
         boats = (record[name][step] for name in ("position", "heading_deg", "speed_mps", *_OF_BOATS))

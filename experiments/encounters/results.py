@@ -25,7 +25,7 @@ Pair = tuple[str, str]
 MOST_ENCOUNTERS = 1_000_000
 """Encounters of a family, platform and filter at most: all are listed before the first is played."""
 UNAVOIDABLE_PERCENT = 1.0
-"""Most encounters with several others that may be breached unavoidably, %."""
+"""Most encounters with several others with a separation violation that was unavoidable, %."""
 MOST_WORST = 10
 FAR_M = 1e4
 """A safety margin beyond this, m, says that nobody is near."""
@@ -120,10 +120,10 @@ def results_of(run: Run) -> dict[str, Any]:
 
 
 def goals_of(cells: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Goals of every shield: no avoidable breach, few unavoidable ones among several others.
+    """Goals of every shield: no avoidable violation, few unavoidable ones among several others.
 
-    One rammer of the same platform must not breach at all where the start was outside the unavoidable set. A count
-    that was not judged leaves the goal without data.
+    One rammer of the same platform must cause no violation at all where the start was outside the unavoidable set. A
+    count that was not judged leaves the goal without data.
     """
     goals = []
     for guard in dict.fromkeys(cell["guard"] for cell in cells if is_shield(cell["guard"])):
@@ -147,7 +147,7 @@ def _goal(name: str, value: float, limit: float, cells: Sequence[Mapping[str, An
 
 
 def worst_encounters(columns: Mapping[Cell, Columns], most: int = MOST_WORST) -> list[dict[str, Any]]:
-    """The worst encounters of all cells with a shield: avoidable breaches first, then the closest.
+    """The worst encounters of all cells with a shield: avoidable violations first, then the closest.
 
     Without such a cell, those with another filter, or with none.
     """

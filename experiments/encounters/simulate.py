@@ -185,8 +185,8 @@ class Trajectory:
         scenes: what was played.
         conditions: under which.
         state: (T+1, B, n, N_STATE) true states, index 0 the start.
-        nominal: (T, B, n, 2) what boats wanted: speed m/s, relative heading deg.
-        filtered: (T, B, n, 2) what they were told; those of other boats are what they wanted.
+        nominal: (T, B, n, 2) nominal commands: speed m/s, relative heading deg.
+        filtered: (T, B, n, 2) filtered commands; those of other boats are the nominal ones.
         reason: (T, B, n) reason codes of the safety filter.
         safety_margin_m: (T, B, n) float32, of the safety filter.
         first_goal_s: (B, n) when the first goal was reached, NaN where it was not.

@@ -162,7 +162,7 @@ def _line(name: str, ways: Sequence[pd.DataFrame], seed: int) -> list[str]:
 
 
 def games_to_look_at(rows: Sequence[Row], settings: EntryGames) -> list[tuple[str, Row, Row]]:
-    """Pairs of games off and on, each once, and why they are worth a look: most hits off, hits on, captures lost."""
+    """Pairs of games off and on, each once, and why to look at them: most hits off, hits on, captures lost."""
     import pandas as pd
 
     groups = [(ways[0], ways[-1]) for ways in by_opponent(rows, settings).values()]

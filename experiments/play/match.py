@@ -125,7 +125,7 @@ class Match:
             if watcher is not None and not watcher(self.env):
                 break
         record = self._recorder.finish()
-        record = {**record, "breaches": find_breaches(record["position"], self.shielding.separation_m)}
+        record["breaches"] = find_breaches(record["position"], self.shielding.separation_m)
         return MatchResult(self.spec, self._row(record, time.perf_counter() - started), record)
 
     def seat(self, team: int, policy: Any) -> None:
@@ -140,7 +140,7 @@ class Match:
         self.env.close()
 
     def breaches(self, record: Record, team: int) -> list[dict[str, Any]] | None:
-        """Judge the breaches of a team, 0 blue or 1 red, of the game just played; None where none are judged."""
+        """Judge the hits of a team, 0 blue or 1 red, of the game just played; None where none are judged."""
         if self._log is None:
             return None
         return judge_game(self._log, self.env.core.params, record, team, self.shielding.motion)
@@ -203,7 +203,7 @@ class Match:
         self._moment = None
 
     def _row(self, record: Record, wall_s: float) -> dict[str, Any]:
-        spec, core, steps, own = self.spec, self.env.core, len(record["wanted"]), self.spec.own_team
+        spec, core, steps, own = self.spec, self.env.core, len(record["nominal"]), self.spec.own_team
         counts: dict[str, Any] = {
             name + suffix: int(getattr(core, name)[0, team])
             for name in ("captures", "grabs", "tags")

@@ -41,8 +41,8 @@ class MatchSpec:
         rules: settings of the game that replace the preset's.
         fixed_start: start on the preset's fixed places instead of random ones.
         penalty: weight of a collision in the primary score.
-        radii_m: radii at which breaches are counted.
-        judge: whose breaches the oracle judges, see `verdicts.JUDGE`.
+        radii_m: radii at which separation violations are counted.
+        judge: whose separation violations are judged, see `verdicts.JUDGE`.
         conditions: delay, position noise and current, the same with a shield and without.
         files: digests of both policies' files (`policies.fingerprint`), own and opponent; empty where there are none.
         trust: also load models that lie among entries of others, see `policies.load_sb3`.
@@ -99,7 +99,7 @@ class MatchSpec:
 
     @property
     def judged(self) -> bool:
-        """Whether the oracle judges this game's breaches."""
+        """Whether this game's separation violations are judged."""
         shielded = self.shield is not None or self.opponent_shield is not None
         return self.judge == "all" or (self.judge == "shielded" and shielded)
 

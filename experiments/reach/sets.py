@@ -1,4 +1,4 @@
-"""Sets from which a boat is lost: by the value table, by the shield's own certificate, and found by playing.
+"""Sets from which a boat is lost: by the value table, by the shield's own safety margin, and found by playing.
 
 `compare_sets` sets what the shield cannot promise to save beside what reachability says nobody can save; `play_job`
 plays games from all round the latter, and tells from which positions the shield did not save the boat.
@@ -70,7 +70,7 @@ Place = tuple[float, float, float]
 class SetPair:
     """Areas, m^2, of both sets for one pair of speeds and one relative heading, over the same cells.
 
-    Of positions of the opponent: ``shield_m2`` where the shield's certificate is negative, ``reach_m2`` where the
+    Of positions of the opponent: ``shield_m2`` where the shield's safety margin is negative, ``reach_m2`` where the
     table's value is below the radius, ``missed_m2`` the latter without the former: the table calls them lost, the
     shield calls them safe, and one of the two is wrong.
     """
@@ -205,7 +205,7 @@ def compare_pair(
 
 
 def certificates_m(state: Array, names: tuple[str, str], config: ShieldConfig) -> Array:
-    """The shield's certificate for the first boat of every state, m."""
+    """The shield's safety margin for the first boat of every state, m."""
     shield = BatchedShield(config, len(state), names, (0, 1))
     nominal = np.zeros((len(state), 2, 2))
     nominal[:, :, 0] = get_platform(names[0]).max_speed_mps

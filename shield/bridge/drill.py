@@ -220,7 +220,7 @@ def check_model(
     judged_s = len(errors) * dt_s
     if judged_s < ENOUGH_S:
         text = (
-            f"its place was known and foreseen for {judged_s:.1f} s of its drill, {ENOUGH_S:g} s are needed; "
+            f"its place was known and predicted for {judged_s:.1f} s of its drill, {ENOUGH_S:g} s are needed; "
             "see its rates and links, then run again"
         )
         return CheckResult(f"model:{boat}", False, text, {"judged_s": judged_s})

@@ -1,4 +1,4 @@
-"""Packets of the position and game feed, one JSON object per UDP datagram: every check on them, their seal, who sends.
+"""Packets of the position and game feed, one JSON object per UDP datagram: checks, authentication, who sends.
 
 A packet of kind "positions" says where boats are (`Fix`), one of kind "game" how the game stands (`GameState`).
 A sealed packet is the object, a line break, ``hmac-sha256:`` and the HMAC-SHA256 of the object's bytes in 64

@@ -255,7 +255,7 @@ class ModelLimit(Section):
     """What a boat's model may miss, see `model_error`.
 
     ``widest_m``: bound on the margin that measured errors give a boat. A boat more than ``outside_m`` from where it was
-    foreseen 2 s ago, for ``after_s``: the response; for ``give_up_after_s``: handed over, by another.
+    predicted 2 s ago, for ``after_s``: the response; for ``give_up_after_s``: handed over, by another.
     """
 
     widest_m: float = Field(default=1.0, ge=0.0, le=10.0, description="give metres, 0 to 10")

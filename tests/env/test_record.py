@@ -91,7 +91,7 @@ def test_what_older_versions_did_not_write_is_filled_in(game_record, tmp_path):
     assert not loaded["is_disabled"].any()
 
 
-@pytest.mark.parametrize("name", [name for name in ARRAYS if name != "wanted"])
+@pytest.mark.parametrize("name", [name for name in ARRAYS if name != "nominal"])
 def test_an_array_of_another_length_is_named(game_record, name):
     values = game_record[name]
     short = values[:, :3] if name == "breaches" else values[:-1]
@@ -180,7 +180,9 @@ def test_recording_step_by_step_gives_the_same_record_and_a_step_that_does_not_f
     with pytest.raises(TraceError, match=r"sent has shape \(3, 2\), expected \(4, 2\)"):
         recorder.step(view_of(game_record, 1), np.zeros((4, 2)), np.zeros((3, 2)))
     for step in range(60):
-        commands = [game_record[name][step] for name in ("wanted", "sent", "reason", "intervened", "safety_margin_m")]
+        commands = [
+            game_record[name][step] for name in ("nominal", "filtered", "reason", "intervened", "safety_margin_m")
+        ]
         recorder.step(view_of(game_record, step + 1), *commands)
     again = recorder.finish(game_record["breaches"])
     for name in ARRAYS:
@@ -191,7 +193,7 @@ def test_a_game_without_a_step_is_a_record(game_record, game_meta, tmp_path):
     recorder = GameRecorder()
     recorder.start(view_of(game_record, 0), game_meta)
     record = load(save(recorder.finish(), tmp_path / "game.npz"))
-    assert record["wanted"].shape == (0, 4, 2)
+    assert record["nominal"].shape == (0, 4, 2)
 
 
 @given(st.floats(-360, 360), st.floats(-180, 180))
@@ -233,3 +235,18 @@ def test_a_record_has_all_of_a_config(game_meta):
         make_record(game_meta, speeds=np.zeros(3))
     with pytest.raises(TraceError, match="unknown separation; a record takes separation_m"):
         meta_of(GameConfig.preset("aamas2024"), separation=2.5)
+
+
+def test_names_of_0_9_are_read_and_answered_with_a_warning(game_record, tmp_path):
+    old = {{"nominal": "wanted", "filtered": "sent"}.get(name, name): values for name, values in game_record.items()}
+    np.savez(tmp_path / "old.npz", **old)
+    for record in (load(tmp_path / "old.npz"), load(save(old, tmp_path / "again.npz"))):
+        assert set(record) == set(game_record)
+        for name, new in (("wanted", "nominal"), ("sent", "filtered")):
+            with pytest.warns(DeprecationWarning, match=f"'{name}' is now '{new}'") as caught:
+                np.testing.assert_array_equal(record[name], game_record[new])
+            assert caught[0].filename == __file__
+    with pytest.raises(KeyError, match="told"):
+        game_record["told"]
+    arrays = {name: values for name, values in old.items() if name != "meta"}
+    assert set(make_record(read_meta(old), **arrays)) == set(game_record)

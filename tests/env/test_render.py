@@ -80,7 +80,7 @@ def test_a_changed_command_shows_in_its_own_colour(game_record):
     colour = THEMES["light"].changed
     legend = share_of(drawn(game_record, 5, width_px=1280), colour)
     assert share_of(drawn(game_record, 12, width_px=1280), colour) > legend + 0.0003
-    assert np.isnan(game_record["wanted"][31, 1]).all()
+    assert np.isnan(game_record["nominal"][31, 1]).all()
     drawn(game_record, 31)
 
 
@@ -183,7 +183,7 @@ def test_records_that_cannot_be_drawn(game_meta, game_record, tmp_path):
         with pytest.raises(TraceError, match="cannot be drawn"):
             Renderer(meta)
     with pytest.raises(TraceError, match="lacks sent"):
-        save_animation({name: values for name, values in game_record.items() if name != "sent"}, tmp_path / "a.gif")
+        save_animation({name: values for name, values in game_record.items() if name != "filtered"}, tmp_path / "a.gif")
 
 
 def test_a_frame_is_saved(game_record, tmp_path):

@@ -206,7 +206,7 @@ def test_results_are_written_whole_and_documented(played, tmp_path):
     (page,) = (path for path in write_pages([content], tmp_path) if path.name == "ablation_aamas2024.md")
     text = page.read_text()
     assert f"| tags | {interval_text(content['pairings'][0]['metrics']['tags']['off'])} |" in text
-    assert "| hits with opponents at 2.5 m, of boats the team commands, on / off |" in text
+    assert "| hits with opponents at 2.5 m, of boats the team commands, on / off (" in text
     assert (tmp_path / "ablation_aamas2024.png").read_bytes()[1:4] == b"PNG"
 
 
@@ -266,7 +266,7 @@ def test_a_goal_just_missed_does_not_look_as_if_it_were_met():
         "0.0033", "0.00", "0.9496", "250000.4", "-",
     ]  # fmt: skip
     missed = {"name": "hits", "value": 1 / 300, "sense": "<=", "limit": 0.0, "met": False, "low": 8e-5, "high": 0.0186}
-    assert "0.0033 <= 0.00 not met" in " ".join(printed(goals_table([missed]), 80).split())
+    assert "0.0033 [0.00, 0.02] <= 0.00 not met" in " ".join(printed(goals_table([missed]), 80).split())
     assert "| hits | 0.0033 | <= 0.00 | **not met** |" in goals_lines([missed])
     assert goal_rows([missed])[0]["measured"] == "0.0033 [0.00, 0.02]"
 

@@ -125,7 +125,7 @@ def test_play_saves_what_it_is_asked_to_and_render_goes_on_from_there(monkeypatc
     content = json.loads(Path("a.json").read_text())
     assert keys.undocumented(content, keys.KEYS["play"]) == []
     assert content["game"]["steps"] == 20
-    assert len(load("a.npz")["wanted"]) == 20
+    assert len(load("a.npz")["nominal"]) == 20
     films = run("render", "a.npz", "--to", "b.gif", "--json", "b.json")
     assert films.exit_code == ExitCode.OK, films.output
     assert keys.undocumented(json.loads(Path("b.json").read_text()), keys.KEYS["render"]) == []

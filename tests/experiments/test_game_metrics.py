@@ -30,8 +30,8 @@ def record_of(position, shielded=True, **arrays):
         **still,
         "flag_position": np.zeros((steps + 1, 2, 2)),
         "captures": np.zeros((steps + 1, 2)),
-        "wanted": np.zeros((steps, 4, 2)),
-        "sent": np.zeros((steps, 4, 2)),
+        "nominal": np.zeros((steps, 4, 2)),
+        "filtered": np.zeros((steps, 4, 2)),
         "reason": reason,
         "intervened": np.zeros((steps, 4)),
         "safety_margin_m": np.full((steps, 4), np.nan),
@@ -67,7 +67,7 @@ def test_breaches_are_split_by_team_and_radius(crossing):
 
 def test_deadlocks_are_those_of_the_own_team(crossing):
     record = record_of(np.repeat(crossing[:1], 102, axis=0))
-    record["wanted"][..., 0], record["speed_mps"][:] = 1.0, 0.1
+    record["nominal"][..., 0], record["speed_mps"][:] = 1.0, 0.1
     assert tally(record, 0)["deadlocks"] == tally(record, 1)["deadlocks"] == 1
     record["speed_mps"][50, 0] = 1.0
     assert (tally(record, 0)["deadlocks"], tally(record, 1)["deadlocks"]) == (0, 1)

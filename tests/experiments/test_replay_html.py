@@ -84,11 +84,11 @@ def test_the_page_holds_the_record(game_record, tmp_path):
     np.testing.assert_array_equal(values["reason"].T, record["reason"])
     np.testing.assert_array_equal(values["intervened"].T != 0, record["intervened"])
     np.testing.assert_allclose(values["certificate"].T, record["safety_margin_m"], atol=1e-3)
-    for name in ("wanted", "sent"):
-        usable = np.isfinite(record[name]).all(axis=-1)
+    for name, commands in (("wanted", record["nominal"]), ("sent", record["filtered"])):
+        usable = np.isfinite(commands).all(axis=-1)
         np.testing.assert_array_equal(np.isfinite(values[f"{name}_speed"].T), usable)
-        np.testing.assert_allclose(values[f"{name}_speed"].T[usable], record[name][usable][:, 0], atol=1e-4)
-        assert angle_error(values[f"{name}_heading"].T[usable], record[name][usable][:, 1]).max() < 0.003
+        np.testing.assert_allclose(values[f"{name}_speed"].T[usable], commands[usable][:, 0], atol=1e-4)
+        assert angle_error(values[f"{name}_heading"].T[usable], commands[usable][:, 1]).max() < 0.003
     assert game["captures"] == [[0, 0, 0], [40, 1, 0]]
     np.testing.assert_allclose(game["breaches"], record["breaches"], atol=1e-3)
     assert game["meta"]["reason_names"] == read_meta(record)["reason_names"]

@@ -46,7 +46,7 @@ def test_without_conditions_a_game_is_bit_for_bit_what_it_was(shield, monkeypatc
 def test_own_boats_obey_so_many_steps_later_and_all_are_carried(side, shield):
     """The one law of motion that the oracle takes a game to have: command of k steps ago, plus the way of the water."""
     match = Match(spec_of(replace(ALL, delay_s=0.25), side=side, shield=shield, judge="all", seed=1))
-    sent = match.play().record["sent"]
+    sent = match.play().record["filtered"]
     states, motion, params = match._log.states, match.shielding.motion, match.env.core.params
     assert motion.delay_steps == ((3, 3, 3, 0, 0, 0) if side == "blue" else (0, 0, 0, 3, 3, 3))
     assert np.hypot(*motion.current_mps) == pytest.approx(0.3)

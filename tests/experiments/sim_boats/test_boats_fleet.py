@@ -248,7 +248,7 @@ def test_runs_and_writes_figures_and_record(tmp_path):
     assert content["simulated_s"] >= 4.0
     assert content["played"]
     assert len(content["closest"]) == 15
-    assert len(load(record)["wanted"]) >= 35
+    assert len(load(record)["nominal"]) >= 35
     assert "blue_1: restart" in result.output
     assert "driven by" in result.output
 

@@ -69,7 +69,7 @@ def test_the_record_is_a_games_and_the_oracle_judges_it(tmp_path):
         assert record["position"].shape == (201, 6, 2)
         assert np.array_equal(record["state"][-1], states, equal_nan=True)
         assert np.array_equal(record["position"][-1], states[:, [L.X, L.Y]])
-        assert (record["sent"][:, :, 0] > 0.5).any()
+        assert (record["filtered"][:, :, 0] > 0.5).any()
         closest = fleet.closest_approaches()[0]
         names = list(fleet.boats)
         pair = [names.index(closest.first), names.index(closest.second)]
