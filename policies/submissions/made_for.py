@@ -87,7 +87,7 @@ def check_game(made: MadeFor, game: GameConfig | SeenGame, source: object) -> No
         return
     names, other = platform_names(game), ""
     if not math.isclose(made.decision_s, game.decision_s, rel_tol=1e-9):
-        other = f"for decisions of {made.decision_s:g} s, but this game's last {game.decision_s:g} s"
+        other = f"for a decision every {made.decision_s:g} s, but this game decides every {game.decision_s:g} s"
     elif made.platforms and made.platforms != names:
         other = f"for boats {', '.join(made.platforms)}, but this game has {', '.join(names)}"
     if other:

@@ -231,9 +231,9 @@ def test_an_encrypted_or_garbled_file_in_a_zip_says_nothing(offset, tmp_path):
     [
         (
             GameConfig.preset("mctf2025"),
-            r"for decisions of 1 s, but this game's last 0\.1 s; play it by preset mctf2026",
+            r"for a decision every 1 s, but this game decides every 0\.1 s; play it by preset mctf2026",
         ),
-        (GameConfig.preset("mctf2026", decision_steps=4), r"for decisions of 1 s, but this game's last 0\.4 s"),
+        (GameConfig.preset("mctf2026", decision_steps=4), r"a decision every 1 s, but this game decides every 0\.4 s"),
         (GameConfig.preset("mctf2026", platforms="heron"), "for boats surveyor, .* but this game has heron, "),
     ],
 )

@@ -117,6 +117,11 @@ def test_a_report_is_a_page_with_the_games_to_look_at(write_entry):
     go_on = run("report", entry, *settings, "--resume")
     assert go_on.exit_code == ExitCode.OK, go_on.output
     assert json.loads(Path("out/results.json").read_text())["games_resumed"] == 3
+    there = {path.name: path.read_bytes() for path in Path("out").iterdir() if path.is_file()}
+    other = run("report", entry, *settings, "--separation", "5", "--resume")
+    assert other.exit_code == ExitCode.BAD_INPUT
+    assert "shield.separation_m was 4.0, is 5.0" in other.stderr
+    assert there == {path.name: path.read_bytes() for path in Path("out").iterdir() if path.is_file()}
 
 
 def test_a_report_of_an_entry_that_has_a_shield_or_of_other_rules_plays_no_zip(write_entry, monkeypatch):

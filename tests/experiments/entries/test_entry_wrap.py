@@ -154,7 +154,7 @@ def test_it_says_which_game_and_which_shield_it_is_for(wrapped, tmp_path):
 def test_commands_refuse_a_game_it_is_not_for_and_tell_of_less(wrapped):
     other = run("check", wrapped[0], "--max-time", 2, "--preset", "mctf2025")
     assert other.exit_code == ExitCode.BAD_INPUT
-    assert "is for decisions of 1 s, but this game's last 0.1 s; play it by preset mctf2026" in other.stderr
+    assert "is for a decision every 1 s, but this game decides every 0.1 s; play it by preset mctf2026" in other.stderr
     wider = ["play", "--own", str(wrapped[0]), "--opponent", "hold", "--preset", "mctf2026", "--max-time", "1"]
     done = commands.run(*wider, "--set", "agent_radius_m=3", "--no-shield")
     assert done.exit_code == ExitCode.OK, done.output
