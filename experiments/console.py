@@ -127,6 +127,7 @@ class OnceCommand(TyperCommand):
         options = [option for option in self.get_params(ctx) if isinstance(option, TyperOption)]
         known = {name for option in options for name in (*option.opts, *option.secondary_opts)}
         takes = {name: option for option in options if not option.is_flag for name in option.opts}
+        args = args[: args.index("--")] if "--" in args else args
         for name, after in zip(args, [*args[1:], None], strict=False):
             if name in takes and (after is None or after in known):
                 found = "nothing follows it" if after is None else f"{after} follows it"

@@ -18,6 +18,7 @@ from .play.conditions import words_of
 from .tables import (
     COVERED_HEAD,
     COVERED_WORDS,
+    LEFT_HEAD,
     columns_of,
     goal_cells,
     interval_text,
@@ -289,7 +290,8 @@ def _bars(title: str, pairings: Sequence[Summary], key: str, words: str, referen
 def _legend(groups: Sequence[tuple[str, Sequence[tuple[str, Any]]]]) -> list[tuple[str, str]]:
     """Colours of the states that are drawn."""
     drawn = {state for _, group in groups for state, _ in group}
-    return [(state, words) for state, words in SHIELDS if state in drawn]
+    words = dict(SHIELDS) | ({ON: f"shield {LEFT_HEAD}"} if COVERED in drawn else {})
+    return [(state, words[state]) for state in words if state in drawn]
 
 
 def _closest(games: Sequence[Mapping[str, Any]], separation_m: float) -> Plot:

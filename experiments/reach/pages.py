@@ -141,7 +141,7 @@ def show_card(console: Console, card: Card) -> None:
         title = f"Area, m², from which {radius} m cannot be kept, by relative heading"
         console.print("", titled(title, AREA_HEADS, _areas(card, radius)))
     heads = ["", *(f"{radius} m" for radius in _radii(card))]
-    console.print("", titled("What the table is worth", heads, card_rows(card)))
+    console.print("", titled("How good the table is", heads, card_rows(card)))
 
 
 def _radii(card: Card) -> list[str]:

@@ -94,7 +94,10 @@ def test_both_figures_are_in_results_tables_and_pages_and_goals_are_of_the_first
     write_results(run, results)
     content = json.loads((run.folder / "results.json").read_text())
     assert undocumented(content, KEYS["ablate"]) == []
-    assert "covered − off, paired" in (run.folder / "report.html").read_text()
+    report = (run.folder / "report.html").read_text()
+    assert all(
+        words in report for words in ("covered − off, paired", "shield on, left to the game", "shield on, covered")
+    )
     (page,) = (path for path in write_pages([content], tmp_path / "docs") if path.name == "ablation_aamas2024.md")
     assert (
         "| shield off | on, left to the game | on - off, paired | on, covered | covered - off, paired |"
