@@ -52,7 +52,7 @@ MaxTime = Annotated[float | None, option("S", "Length of a game, s.", default="6
 Side = Annotated[str, option("COLOUR", "Colour of the own team: blue or red.")]
 Shielded = Annotated[bool, flag("Whether the own team is shielded.", "--shield/--no-shield")]
 NoAutopilot = Annotated[
-    bool, flag("Leave boats the game drives (tagged, out of bounds) unshielded.", "--no-shield-autopilot")
+    bool, flag("Leave boats the game drives (tagged, out of bounds) to it.", "--no-shield-autopilot")
 ]
 Judge = Annotated[
     str, option("WHO", "Whose hits are judged avoidable or not: all, shielded (games with the shield) or none.")
