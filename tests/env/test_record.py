@@ -177,7 +177,7 @@ def test_recording_step_by_step_gives_the_same_record_and_a_step_that_does_not_f
     with pytest.raises(TraceError, match=r"Call start\(\) before finish"):
         recorder.finish()
     recorder.start(view_of(game_record, 0), game_meta)
-    with pytest.raises(TraceError, match=r"sent has shape \(3, 2\), expected \(4, 2\)"):
+    with pytest.raises(TraceError, match=r"filtered has shape \(3, 2\), expected \(4, 2\)"):
         recorder.step(view_of(game_record, 1), np.zeros((4, 2)), np.zeros((3, 2)))
     for step in range(60):
         commands = [

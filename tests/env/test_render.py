@@ -182,7 +182,7 @@ def test_records_that_cannot_be_drawn(game_meta, game_record, tmp_path):
     ):
         with pytest.raises(TraceError, match="cannot be drawn"):
             Renderer(meta)
-    with pytest.raises(TraceError, match="lacks sent"):
+    with pytest.raises(TraceError, match="lacks filtered"):
         save_animation({name: values for name, values in game_record.items() if name != "filtered"}, tmp_path / "a.gif")
 
 

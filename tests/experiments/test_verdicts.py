@@ -150,7 +150,9 @@ def test_verdicts_reach_results_tables_and_report(stored, tmp_path, monkeypatch)
     assert "3 more in results.json" in page
     write_pages([content], tmp_path / "docs")
     text = (tmp_path / "docs/ablation_aamas2024.md").read_text()
-    driven = sum(one["driven"] for one in content["breaches"] if (one["state"], one["kind"]) == ("on", "opponent"))
+    driven = sum(
+        bool(one.get("driven")) for one in content["breaches"] if (one["state"], one["kind"]) == ("on", "opponent")
+    )
     assert part["opponent"]["game_controlled"] == driven
     assert f"| opponent, on | 2 | {driven} | 2 | 0 | 0 | 0 | 2.00 [0.24, 7.22] |" in text
 
