@@ -2,7 +2,8 @@
 
 Run it as a script for the table: ``python tests/shield/bridge/moos/drills.py``. Where ``MOOSDB`` is on the path
 the drills are run beside the real one as well, and where all of MOOS-IvP is, three against three are played on it
-(``drills.py mission``: that alone); elsewhere it says so.
+(``drills.py mission``: that alone; ``drills.py mission heron``: with boats taken for herons); elsewhere it says so.
+``drills.py fit FILE.yaml`` drives one of its boats alone and writes the platform that fits it.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import signal
 import sys
 import threading
 import time
+from pathlib import Path
 
 sys.path.insert(0, os.path.dirname(__file__))
 
@@ -394,7 +396,10 @@ def drill_all(chosen):
 def main():
     import real_mission  # it needs this module
 
-    if sys.argv[1:] != ["mission"]:
+    if sys.argv[1:2] == ["fit"]:
+        say(real_mission.missing() or real_mission.fit(Path(sys.argv[2])))
+        return
+    if sys.argv[1:2] != ["mission"]:
         say("On the stand-in:")
         drill_all(sys.argv[1:])
         if shutil.which("MOOSDB") is None:
@@ -403,8 +408,9 @@ def main():
         say("Beside MOOSDB:")
         boats_of_moos.StandInDb = RealDb
         drill_all(sys.argv[1:])
+    platform = next(iter(sys.argv[2:]), None) if sys.argv[1:2] == ["mission"] else None
     say(real_mission.missing() or "On the real MOOS-IvP, 3 against 3:")
-    for what, value in {} if real_mission.missing() else real_mission.play().items():
+    for what, value in {} if real_mission.missing() else real_mission.play(platform=platform).items():
         say(f"| {what} | {value:.4g} |")
 
 

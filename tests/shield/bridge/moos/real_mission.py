@@ -3,6 +3,9 @@
 The helms of all six drive lanes that cross; ours put RAW_ before their DESIRED_*, and the gate filters what they want.
 What is measured is where the simulators say the boats are. NODE_REPORTs go from boat to boat by a relay of ours, as
 uFldNodeComms does it on a shoreside. Whoever imports this asks `missing` first: without MOOS there is nothing to play.
+
+The boats' platform is that of their simulator: one that was fitted to it (`fit` does it again) by the steps of the page
+on a boat of your own. `alone` runs those steps' commands, such as the preflight that sees whether it fits.
 """
 
 from __future__ import annotations
@@ -11,6 +14,7 @@ import contextlib
 import math
 import shutil
 import subprocess
+import sys
 import tempfile
 import time
 from collections import Counter
@@ -26,6 +30,8 @@ from steerclear.shield.bridge.moos.client import MoosClient
 
 APPS = (("uSimMarineV22", "uSimMarine"), ("pMarinePIDV22", "pMarinePID"), ("pNodeReporter",), ("pHelmIvP",))
 """Of each kind the first that is installed is played."""
+PLATFORMS = {"uSimMarineV22": str(Path(__file__).with_name("usimmarine_v22.yaml")), "uSimMarine": "heron"}
+"""What describes the boats that each simulator moves, with the settings below."""
 NAMES = ("blue_1", "blue_2", "blue_3", "red_1", "red_2", "red_3")
 LANES = (
     ((6.0, 6.0), (74.0, 34.0)),
@@ -116,32 +122,36 @@ def missing() -> str:
 
 
 class Boats:
-    """Six communities, each with programs of its own, and what their simulators say."""
+    """Communities, each with programs of its own, and what their simulators say."""
 
-    def __init__(self, folder: Path) -> None:
-        self.ports = dict(zip(NAMES, free_ports(len(NAMES)), strict=True))
-        self.at: dict[str, dict[str, float]] = {name: {} for name in NAMES}
+    def __init__(self, folder: Path, names: tuple[str, ...] = NAMES) -> None:
+        self.ports = dict(zip(names, free_ports(len(names)), strict=True))
+        self.at: dict[str, dict[str, float]] = {name: {} for name in names}
         self._stack, self._folder, self._clients = contextlib.ExitStack(), folder, {}
 
     def __enter__(self) -> Boats:
-        for name, lane in zip(NAMES, LANES, strict=True):
-            file = self._write(name, lane)
+        for name in self.at:
+            file = self._write(name, LANES[NAMES.index(name)])
             self._run("MOOSDB", file)
             self._clients[name] = client = self._client(name)
             client.start()
         if not until(lambda: all(client.connected for client in self._clients.values()), START_S):
             raise RuntimeError("the MOOSDBs do not answer; see their output")
-        for name in NAMES:
+        for name in self.at:
             for kind in APPS:
-                self._run(_installed(kind), self._folder / f"{name}.moos")
+                self._run(_installed(kind), self.mission(name))
         if not until(lambda: all({"NAV_X", "NAV_Y"} <= set(place) for place in self.at.values()), START_S):
-            raise RuntimeError(f"no NAV_X and NAV_Y of {[name for name in NAMES if not self.at[name]]}")
+            raise RuntimeError(f"no NAV_X and NAV_Y of {[name for name in self.at if not self.at[name]]}")
         return self
 
     def __exit__(self, *_: object) -> None:
         for client in self._clients.values():
             client.close()
         self._stack.close()
+
+    def mission(self, name: str) -> Path:
+        """A boat's .moos file."""
+        return self._folder / f"{name}.moos"
 
     def deploy(self) -> None:
         """Press DEPLOY: nobody holds a boat by hand any more."""
@@ -158,7 +168,7 @@ class Boats:
             if message.key in ("NAV_X", "NAV_Y"):
                 self.at[name][message.key] = message.value
             elif message.key == "NODE_REPORT_LOCAL":
-                for other in NAMES:
+                for other in self.at:
                     if other != name:
                         self._clients[other].post({"NODE_REPORT": message.text})
 
@@ -167,7 +177,7 @@ class Boats:
 
     def _write(self, name: str, lane: tuple[tuple[float, float], tuple[float, float]]) -> Path:
         (x, y), (to_x, to_y) = lane
-        behaviors, file = self._folder / f"{name}.bhv", self._folder / f"{name}.moos"
+        behaviors, file = self._folder / f"{name}.bhv", self.mission(name)
         behaviors.write_text(BEHAVIORS.format(speed=SPEED_MPS, there=f"{to_x:g},{to_y:g}", back=f"{x:g},{y:g}"))
         heading = math.degrees(math.atan2(to_x - x, to_y - y)) % 360.0
         file.write_text(
@@ -194,22 +204,47 @@ def _installed(names: tuple[str, ...]) -> str:
     return next(name for name in names if shutil.which(name))
 
 
-def fleet_text(boats: Boats) -> str:
-    """The runner's file for these boats."""
+def fleet_text(boats: Boats, platform: str | None = None) -> str:
+    """The runner's file for these boats, all of the platform; None: the one that describes their simulator."""
     lines = [HEAD.replace(", y_axis_deg: 30", "").rstrip()]
-    for i, name in enumerate(NAMES):
-        link = f', link: {{kind: moos, address: "moos://127.0.0.1:{boats.ports[name]}"}}' if i < 3 else ""
-        lines.append(f"  - {{name: {name}, agent: agent_{i}, platform: heron{link}}}")
+    platform = platform or PLATFORMS[_installed(APPS[0])]
+    for i, (name, port) in enumerate(boats.ports.items()):
+        side = f"agent: agent_{i}" if len(boats.ports) == len(NAMES) else "team: blue"
+        link = f'kind: moos, address: "moos://127.0.0.1:{port}", mission: "{boats.mission(name)}"'
+        link = f", link: {{{link}}}" if name.startswith("blue") else ""
+        lines.append(f'  - {{name: {name}, {side}, platform: "{platform}"{link}}}')
     return "\n".join([*lines, "shield: {delay_s: 0.2, position_error_m: 0.3}"]) + "\n"
 
 
-def play(seconds: float = 180.0) -> dict[str, float]:
-    """Play the mission behind the gate; what came of it."""
+def alone(command: str, folder: Path, platform: str | None = None) -> subprocess.CompletedProcess[str]:
+    """Run ``steerclear`` with such a command on one of our boats, the only one on the water; ended, with its words."""
+    with Boats(folder, NAMES[:1]) as boats:
+        file = folder / "FLEET.yaml"
+        file.write_text(fleet_text(boats, platform))
+        boats.deploy()
+        return _steerclear(command, str(file))
+
+
+def fit(out: Path) -> str:
+    """Write the platform that fits the simulator's boats, from a sea trial of 8 minutes; what was said of it."""
+    with tempfile.TemporaryDirectory() as folder:
+        alone("sea-trial", Path(folder), "heron").check_returncode()
+        (log,) = Path(folder).glob("logs/*.mcap")
+        return _steerclear("fit", str(log), "--boat", NAMES[0], "--out", str(out)).stdout
+
+
+def _steerclear(*words: str) -> subprocess.CompletedProcess[str]:
+    program = Path(sys.executable).with_name("steerclear")
+    return subprocess.run([str(program), *words], capture_output=True, text=True, check=False)
+
+
+def play(seconds: float = 180.0, platform: str | None = None) -> dict[str, float]:
+    """Play the mission behind the gate, with `fleet_text`'s platform; what came of it."""
     closest = {"teammate": math.inf, "opponent": math.inf}
     inside: set[tuple[str, str]] = set()
     violations: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as folder, Boats(Path(folder)) as boats:
-        text = fleet_text(boats)
+        text = fleet_text(boats, platform)
         fleet = parse_fleet(text)
         with Gate(fleet) as gate:
             header = header_of_fleet(fleet, text, policy="moos", commanded=gate.links, clock_s=gate.clock.now_s())
