@@ -18,7 +18,7 @@ PROFILES = {"competitive": (12.0, 7.0), "ramming": (math.inf, math.inf), "consta
 """`ShieldConfig.adversary_horizon_s` and `intruder_horizon_s` of each profile, s."""
 
 
-class Unsaid(float):
+class DefaultDistance(float):
     """A distance that nobody chose: a game's own replaces it if larger. It stays one in copies of settings."""
 
 
@@ -52,7 +52,7 @@ class ShieldConfig:
         ConfigError: a value is of the wrong type, not finite or out of range.
     """
 
-    separation_m: float = _number(Unsaid(2.5), 1000.0, above=True)  # required distance between boat centres
+    separation_m: float = _number(DefaultDistance(2.5), 1000.0, above=True)  # required distance between boat centres
     buffer_m: float = _number(0.05, 50.0)  # added to the separation for rounding and sampling
     dt_s: float = _number(0.1, 2.0, 0.01)  # step of the decision loop,
     move_s: float | None = _number(None, 1.0, 0.01)  # and of the boat model, if a command is held for several
@@ -82,7 +82,7 @@ class ShieldConfig:
     edge_m: float | None = _number(0.2, 200.0)  # clearance from the field edge; None: the edge is ignored
     beyond_m: float | None = _number(None, 1000.0)  # how far outside the edge the hard line lies; None: there is none
     beyond_then: str = "flee"  # or "stop": a boat beyond the hard line, and before obstacles, see `filter.last_line`
-    obstacle_clearance_m: float = _number(Unsaid(1.0), 200.0)  # clearance from walls of obstacles
+    obstacle_clearance_m: float = _number(DefaultDistance(1.0), 200.0)  # clearance from walls of obstacles
     barriers: tuple[str, ...] = ()  # names of registered barriers in force; in one text joined by "+"
 
     def __post_init__(self) -> None:
@@ -129,9 +129,9 @@ class ShieldConfig:
             return self.intruder_horizon_s
         return PROFILES[self.profile][1] if self.adversary_horizon_s is None else self.adversary_horizon_s
 
-    def said(self, name: str) -> bool:
+    def is_chosen(self, name: str) -> bool:
         """Return whether somebody chose this setting; False is known only of distances that a game may choose."""
-        return not isinstance(getattr(self, name), Unsaid)
+        return not isinstance(getattr(self, name), DefaultDistance)
 
     @classmethod
     def of(cls, **settings: Any) -> ShieldConfig:
@@ -173,7 +173,7 @@ def _checked(entry: Field[Any], value: Any) -> float | None:
     if isinstance(value, bool) or not isinstance(value, Real) or value != value:
         raise ConfigError(f"{name} is {value!r}; give a number")
     try:
-        number = value if isinstance(value, Unsaid) else float(value)
+        number = value if isinstance(value, DefaultDistance) else float(value)
     except OverflowError:
         raise ConfigError(f"{name} is too large; give a finite number") from None
     if not low <= number <= high or (above and number == low):

@@ -18,7 +18,7 @@ import numpy as np
 
 from . import workspace as W
 from .backup.assign import note_manoeuvre
-from .backup.score import ALL, OBSTACLES, OPPONENTS
+from .backup.score import CLEAR_OF_ALL, CLEAR_OF_BOATS, CLEAR_OF_OBSTACLES
 from .barriers.boats import reported_margin
 from .barriers.clearance import MARGIN
 from .barriers.neighbours import note_predicted
@@ -27,9 +27,8 @@ from .barriers.static import STATIC, about
 from .config import ShieldConfig
 from .filter.backup_switch import back_up
 from .filter.blend import any_may_be_blended, blend, rescore_backups
-from .filter.groups import close_groups, make_groups, open_group
 from .filter.last_line import keep_last_line, note_last_resorts
-from .filter.nominal import check_nominal
+from .filter.nominal import check_nominal, close_groups, make_groups, open_group
 from .filter.program import Program, Solver
 from .filter.qp import ROUNDS, accept, among_mates, begin_program, end_program, linearise, solve
 from .filter.right_of_way import forget_deadlock, note_deadlock
@@ -122,7 +121,7 @@ def store_decision(b: int, scene: Scene) -> None:
         sent = scene.sent[b, i]
         sent[0], sent[1] = given[i, W.NOMINAL_SPEED], given[i, W.NOMINAL_TURN]
         reason = scene.reason[i]
-        bound = -1 if reason == W.NOT_COVERED else scene.bound[i]
+        active = -1 if reason == W.NOT_COVERED else scene.active[i]
         passed = reason in (W.PASSED, W.NOT_COVERED)
         same = command[i, 0] == scene.nominal[i, 0] and command[i, 1] == scene.nominal[i, 1]
         changed = not (passed or same)
@@ -131,12 +130,12 @@ def store_decision(b: int, scene: Scene) -> None:
             turned = state[i, L.HEADING] - given[i, L.HEADING]
             if turned != 0.0:
                 sent[1] += turned
-            if bound == -1 and reason != W.HELD:  # nothing else changes commands
-                bound = STATIC
+            if active == -1 and reason != W.HELD:  # nothing else changes commands
+                active = STATIC
         if reason == W.BACKUP and scene.solver[i] == W.BY_LINE_SEARCH:
             reason = W.LEAST_CHANGE
         scene.changed[b, i], scene.reasons[b, i] = changed, reason
-        reported[i, W.SLACK_M], reported[i, W.ACTIVE] = scene.slack_m[i], bound
+        reported[i, W.SLACK_M], reported[i, W.ACTIVE] = scene.slack_m[i], active
         reported[i, W.CUT_SHORT] = 1.0 if scene.ours[i] and scene.cut_short[0] else 0.0
         reported[i, W.ADVERSARY_HORIZON_S] = _reported_adversary_horizon(i, own, scene)
         reported[i, W.SOLVER] = scene.solver[i] if reason == W.LEAST_CHANGE else 0
@@ -176,17 +175,17 @@ def commit(scene: Scene) -> None:
             memory[W.HAS_BACKUP], memory[W.BACKING_UP] = 0.0, 0.0
             forget_deadlock(i, scene)
             continue
-        memory[W.HAS_BACKUP], memory[W.BACKUP_SIDE], memory[W.BACKUP_SPEED] = 1.0, manoeuvre[0], manoeuvre[2]
+        memory[W.HAS_BACKUP], memory[W.BACKUP_RUDDER], memory[W.BACKUP_SPEED] = 1.0, manoeuvre[0], manoeuvre[2]
         memory[W.BACKUP_HEADING] = np.nan
         if manoeuvre[1] > LEAST_TURN_DEG:
             end_deg = scene.next_state[i, L.HEADING] + math.copysign(manoeuvre[1], manoeuvre[0])
             memory[W.BACKUP_HEADING] = wrap_degrees(end_deg)
         memory[W.BACKUP_MARGIN] = scene.clear[i, MARGIN]
-        memory[W.STATIC_MARGIN] = scene.static_clear[i, MARGIN] if scene.satisfied[i] >= OPPONENTS else 0.0
+        memory[W.STATIC_MARGIN] = scene.static_clear[i, MARGIN] if scene.satisfied[i] >= CLEAR_OF_BOATS else 0.0
         memory[W.JOINT_MARGIN] = scene.joint_m[i] if scene.several_pursuers[i] else 0.0
         for j in range(scene.ours.shape[0]):
             apart = scene.boats.table_steps[i] > 0
-            memory[W.N_MEMORY + j] = scene.threats_m[i, j] if apart else scene.threat_m[i]
+            memory[W.N_MEMORY + j] = scene.pursuit_margins_m[i, j] if apart else scene.pursuit_margin_m[i]
         _note_backup_hold(i, scene)
         note_deadlock(i, scene)
 
@@ -195,11 +194,11 @@ def commit(scene: Scene) -> None:
 def _note_causes(scene: Scene) -> None:
     """Note which constraint each nominal command violates; an opponent goes before a nearer teammate."""
     for i in range(scene.ours.shape[0]):
-        short = scene.ours[i] and scene.satisfied[i] < ALL
-        scene.violated[i] = scene.bound[i] if short else -1
-        threatened = scene.satisfied[i] == OBSTACLES and scene.violates_pursuers[i] and scene.threat_by[i] >= 0
-        if short and threatened:
-            scene.violated[i] = scene.threat_by[i]
+        short = scene.ours[i] and scene.satisfied[i] < CLEAR_OF_ALL
+        scene.violated[i] = scene.active[i] if short else -1
+        pursued = scene.satisfied[i] == CLEAR_OF_OBSTACLES and scene.violates_pursuers[i] and scene.pursuer[i] >= 0
+        if short and pursued:
+            scene.violated[i] = scene.pursuer[i]
 
 
 @lean_kernel
@@ -216,9 +215,9 @@ def _name_reasons(scene: Scene) -> None:
         if same and (reason == W.LEAST_CHANGE or (reason == W.BACKUP and scene.slack_m[i] == 0.0)):
             scene.reason[i] = scene.checked_reason[i]
         if scene.reason[i] == W.HELD and unknown_at(i, scene) >= 0:
-            scene.bound[i] = about(unknown_at(i, scene))
-        if scene.violated[i] <= STATIC and scene.satisfied[i] == ALL and not same:
-            scene.bound[i] = scene.violated[i]
+            scene.active[i] = about(unknown_at(i, scene))
+        if scene.violated[i] <= STATIC and scene.satisfied[i] == CLEAR_OF_ALL and not same:
+            scene.active[i] = scene.violated[i]
 
 
 @lean_kernel

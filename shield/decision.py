@@ -116,12 +116,12 @@ class Decision:
     solver: str | None = None
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Decision) and self._said() == other._said()
+        return isinstance(other, Decision) and self._compared() == other._compared()
 
     def __hash__(self) -> int:
-        return hash(self._said())
+        return hash(self._compared())
 
-    def _said(self) -> tuple[Any, ...]:
+    def _compared(self) -> tuple[Any, ...]:
         """Return all that counts for equality; NaN, which equals nothing, as None."""
         values = (getattr(self, entry.name) for entry in fields(self) if entry.compare)
         return tuple(None if value != value else value for value in values)
@@ -153,7 +153,7 @@ class Decisions:
     reason: IntArray  # values of `Reason`
     safety_margin_m: Array
     slack_m: Array
-    bound: IntArray  # index of the active neighbour, -1 none, -2 static constraints, -3 and below ``barriers``
+    active_constraint: IntArray  # index of a boat, -1 none, -2 static constraints, -3 and below ``barriers``
     solve_time_s: float = field(compare=False)  # of the whole decision
     no_table: BoolArray | None = None  # (n, n) own boats and opponents without a value table; None: not known
     cut_short: BoolArray | None = None  # None: not known, taken as False
@@ -183,32 +183,37 @@ class Decisions:
         if not -len(self) <= i < len(self):
             raise IndexError(f"no boat {i} in a fleet of {len(self)}")
         i, names = i % len(self), self.fleet.names
-        heading, bound, reason = self.fleet.heading_rad[i], int(self.bound[i]), Reason(int(self.reason[i]))
-        wanted_speed, wanted_heading = self.nominal.absolute(i, heading)
-        sent_speed, sent_heading = self.filtered.absolute(i, heading)
-        active = (names[bound],) if bound >= 0 else (FIELD,) if bound == STATIC else ()
-        feared_s = math.nan if self.adversary_horizon_s is None else float(self.adversary_horizon_s[i])
+        heading, active, reason = self.fleet.heading_rad[i], int(self.active_constraint[i]), Reason(int(self.reason[i]))
+        nominal_speed, nominal_heading = self.nominal.absolute(i, heading)
+        filtered_speed, filtered_heading = self.filtered.absolute(i, heading)
+        adversarial_s = math.nan if self.adversary_horizon_s is None else float(self.adversary_horizon_s[i])
         covered = reason != Reason.NOT_COVERED
         no_table = None if self.no_table is None else np.flatnonzero(self.no_table[i] & covered)
         return Decision(
             boat=names[i],
-            nominal_heading_rad=wanted_heading,
-            nominal_speed_mps=wanted_speed,
-            filtered_heading_rad=sent_heading,
-            filtered_speed_mps=sent_speed,
+            nominal_heading_rad=nominal_heading,
+            nominal_speed_mps=nominal_speed,
+            filtered_heading_rad=filtered_heading,
+            filtered_speed_mps=filtered_speed,
             intervened=bool(self.intervened[i]),
             reason=reason,
-            active_constraints=(self.barriers[STATIC - 1 - bound],) if bound < STATIC else active,
+            active_constraints=self._names_of(active),
             safety_margin_m=float(self.safety_margin_m[i]),
             slack_m=float(self.slack_m[i]),
             fallback=FALLBACKS.get(reason),
             solve_time_s=self.solve_time_s,
             no_table=None if no_table is None else tuple(names[j] for j in no_table),
             cut_short=self.cut_short is not None and bool(self.cut_short[i]),
-            adversary_horizon_s=None if math.isnan(feared_s) else feared_s,
+            adversary_horizon_s=None if math.isnan(adversarial_s) else adversarial_s,
             outside_m=float(self.outside_m[i]),
             solver=None if self.solver is None else SOLVERS[int(self.solver[i])],
         )
+
+    def _names_of(self, active: int) -> tuple[str, ...]:
+        """Return the names of an active constraint: of a boat, a registered barrier or the field, or none."""
+        if active < STATIC:
+            return (self.barriers[STATIC - 1 - active],)
+        return (self.fleet.names[active],) if active >= 0 else (FIELD,) if active == STATIC else ()
 
     def _place(self, index: Any) -> int:
         """Return the place of a boat in the fleet, by its name or place: no fraction, mask, True or False."""
@@ -232,8 +237,8 @@ class Decisions:
         heads = ("boat", "nominal deg", "m/s", "filtered deg", "m/s", "reason", "active constraint", "margin m")
         rows = [heads, *(one._cells() for one in self)]
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        ways = "<>>>><<>"  # text is aligned left, numbers right
-        lines = ["  ".join(map("{:{}{}}".format, row, ways, widths)) for row in rows]
+        alignments = "<>>>><<>"  # text is aligned left, numbers right
+        lines = ["  ".join(map("{:{}{}}".format, row, alignments, widths)) for row in rows]
         return "\n".join(line.rstrip() for line in lines)
 
     @property

@@ -17,7 +17,7 @@ import numpy as np
 from .backup.assign import choose_manoeuvre, needs_no_search, note_manoeuvre
 from .backup.family import found_turn
 from .backup.rollout import roll_out
-from .backup.score import ALL, OPPONENTS, Score, score_path
+from .backup.score import CLEAR_OF_ALL, CLEAR_OF_BOATS, Score, score_path
 from .barriers.clearance import FAR
 from .barriers.registered import unknown_at
 from .barriers.static import beyond_line
@@ -28,7 +28,7 @@ from .jit import Array, BoolArray, copy_row, kernel, lean_kernel
 from .platforms import layout as L
 from .workspace import LARGEST_COMMAND, PASSED, Scene, Static
 
-SHORT_OF_ALL = Score(OPPONENTS, -FAR)
+SHORT_OF_ALL = Score(CLEAR_OF_BOATS, -FAR)
 """Manoeuvres are scored only as far as needed to decide whether they satisfy everything."""
 
 
@@ -84,13 +84,13 @@ def _has_backup(i: int, scene: Scene) -> bool:
     togo_deg = found_turn(i, scene.next_state[i, L.HEADING], held)
     roll_out(i, trial, held[i, 0], togo_deg, held[i, 2], 1, scene)
     scene.satisfied[i], scene.score_m[i] = score_path(i, trial, SHORT_OF_ALL, scene)
-    if scene.satisfied[i] == ALL or scene.searched[i] > 0 or needs_no_search(i, 0, 1, scene):
-        return scene.satisfied[i] == ALL
+    if scene.satisfied[i] == CLEAR_OF_ALL or scene.searched[i] > 0 or needs_no_search(i, 0, 1, scene):
+        return scene.satisfied[i] == CLEAR_OF_ALL
     scene.searched[i], scene.spent[0] = 1, 0.0
     choose_manoeuvre(i, scene.command[i, 0], 1, False, scene)
-    if scene.satisfied[i] == ALL:
+    if scene.satisfied[i] == CLEAR_OF_ALL:
         note_manoeuvre(i, held, scene)
-    return scene.satisfied[i] == ALL
+    return scene.satisfied[i] == CLEAR_OF_ALL
 
 
 @lean_kernel

@@ -105,7 +105,7 @@ def boats_of(config: ShieldConfig, platforms: tuple[str | Platform, ...], team: 
             team=np.array(team, dtype=np.int64),
             fastest_mps=np.array([kind.fastest_mps(dt_s) for kind in kinds]),
             regain_s=np.array([limit.regain_s for limit in limits]),
-            ready_thrust=np.where(with_table, FULL_THRUST * params[:, L.MAX_THRUST], ENOUGH_THRUST * steady),
+            full_thrust_percent=np.where(with_table, FULL_THRUST * params[:, L.MAX_THRUST], ENOUGH_THRUST * steady),
             stride=stride,
             sample_s=stride * dt_s,
             manoeuvres=manoeuvres,

@@ -1,4 +1,4 @@
-"""Public names of 0.8: each still works for one release and warns with its new name."""
+"""Earlier public names: each still works for one release and warns with its new name."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ SETTINGS = {
 }
 """Settings of `ShieldConfig`, old name to new."""
 SETTING_PROPERTIES = {
+    "said": "is_chosen",
     "feared_s": "effective_adversary_horizon_s",
     "visitor_feared_s": "effective_intruder_horizon_s",
 }
@@ -39,6 +40,7 @@ DECISION = {
     "feared_s": "adversary_horizon_s",
 }
 DECISIONS = {
+    "bound": "active_constraint",
     "wanted": "nominal",
     "sent": "filtered",
     "certificate_m": "safety_margin_m",

@@ -28,7 +28,7 @@ from .masks import passing
 from .model import boats_of, missing_tables
 from .platforms import layout as L
 from .renamed import takes_old_keywords
-from .surroundings import OPEN_WATER, Surroundings, off_m
+from .surroundings import OPEN_WATER, Surroundings, uncertainty_m
 from .tracks import carry_over, steps_of_delay, who_stayed
 from .workspace import Scene, Static
 
@@ -85,7 +85,7 @@ class Shield:
         self._known: tuple[Any, ...] | None = None
         self._missing: BoolArray | None = None
         self._highest_mps = np.zeros(0)  # of boats, in the fleet's order
-        self._bound = np.zeros(0, np.int64)  # active constraints in the fleet's order; negative indices are used, too
+        self._active = np.zeros(0, np.int64)  # active constraints in the fleet's order; negative indices are used, too
         self._autopilots: Autopilots | None = None
         self.serves: object | None = None
 
@@ -205,7 +205,7 @@ class Shield:
         return {
             "safety_margin_m": reported[:, W.MARGIN_M],
             "slack_m": reported[:, W.SLACK_M],
-            "bound": self._bound[reported[:, W.ACTIVE].astype(np.int64)],
+            "active_constraint": self._active[reported[:, W.ACTIVE].astype(np.int64)],
             "cut_short": reported[:, W.CUT_SHORT] != 0.0,
             "adversary_horizon_s": reported[:, W.ADVERSARY_HORIZON_S],
             "solver": reported[:, W.SOLVER].astype(np.int64),
@@ -283,7 +283,7 @@ class Shield:
                 self._autopilots.carry_over(believed, stayed, then)
         self._deciders, self._known = new, (known, keys)
         self._highest_mps = boats.params[place, L.MAX_SPEED]
-        self._bound = np.concatenate([order, np.arange(STATIC - len(self.config.barriers), 0)])
+        self._active = np.concatenate([order, np.arange(STATIC - len(self.config.barriers), 0)])
         return new
 
     def _solver(self) -> Solver | None:
@@ -398,7 +398,7 @@ def _boats_in(fleet: Fleet) -> tuple[Any, ...]:
 
 def barriers_of(config: ShieldConfig) -> RegisteredBarriers:
     """Return the registered barriers of a shield with these settings."""
-    return RegisteredBarriers(config.barriers, off_m(config) + SAG_M, steps_of_delay(config) * config.dt_s)
+    return RegisteredBarriers(config.barriers, uncertainty_m(config) + SAG_M, steps_of_delay(config) * config.dt_s)
 
 
 @lru_cache(maxsize=256)

@@ -80,7 +80,7 @@ class Surroundings:
         Raises:
             ConfigError: nothing of the field is left.
         """
-        wider_m = off_m(config)
+        wider_m = uncertainty_m(config)
         hull_m, stop = config.obstacle_clearance_m + wider_m, config.beyond_then == "stop"
         circles = [(x, y, r + config.obstacle_clearance_m + wider_m) for x, y, r in self.circles]
         circles += [(x, y, r + wider_m) for x, y, r in self.stops]
@@ -109,7 +109,7 @@ class Surroundings:
         """Return the rectangle (xmin, ymin, xmax, ymax) to stay inside, m; infinite where there is none."""
         if self.field is None or config.edge_m is None:
             return NOWHERE.copy()
-        inside_m = config.edge_m + off_m(config)
+        inside_m = config.edge_m + uncertainty_m(config)
         edge = np.array(self.field) - inside_m * OUTWARDS
         if not (edge[0] < edge[2] and edge[1] < edge[3]):
             raise ConfigError(
@@ -119,7 +119,7 @@ class Surroundings:
         return edge
 
 
-def off_m(config: ShieldConfig) -> float:
+def uncertainty_m(config: ShieldConfig) -> float:
     """Return how far off a boat may be one step ahead, m, with room to turn; later drift is added along paths."""
     return config.position_error_m + config.current_mps * (
         steps_of_delay(config) * config.dt_s + config.dt_s + 2.0 * LEAVE_S

@@ -35,11 +35,11 @@ DRIVEN, N_GIVEN = L.N_STATE + 7, L.N_STATE + 11
 """Columns from ``DRIVEN`` on: `Fleet.driven`."""
 
 MARGIN_M, SLACK_M, ACTIVE, CUT_SHORT, ADVERSARY_HORIZON_S, SOLVER, N_REPORTED = range(7)
-"""Columns of ``reported``: safety margin and slack, m; active constraint, see `Decisions.bound`; whether the work
-budget ended the search; how long the boat is adversarial, s (NaN: no opponent); what found a least change, see `BY_QP`.
+"""Columns of ``reported``: safety margin and slack, m; active constraint, see `Decisions`; whether the work budget
+ended the search; how long the boat is adversarial, s (NaN: no opponent); what found a least change, see `BY_QP`.
 """
 
-HAS_BACKUP, BACKUP_SIDE, BACKUP_HEADING, BACKUP_SPEED, BACKUP_MARGIN, JOINT_MARGIN, STATIC_MARGIN = range(7)
+HAS_BACKUP, BACKUP_RUDDER, BACKUP_HEADING, BACKUP_SPEED, BACKUP_MARGIN, JOINT_MARGIN, STATIC_MARGIN = range(7)
 """Columns of ``memory``: whether the boat holds a backup; its side (1: clockwise), end heading, deg (NaN: no turn is
 left), and speed, m/s; verified margins, m: from all boats, from several opponents rolled out, from static constraints.
 """
@@ -71,7 +71,7 @@ class Boats(NamedTuple):
     pursuit_samples: IntArray  # (n,) path samples for which pursuers are followed once thrust is full; >= ``samples``
     chase_samples: IntArray  # (n, n) further samples for which a pursuer (column) no faster than the boat (row) is
     chased_samples: IntArray  # (n,) the most of them in each row
-    ready_thrust: Array  # (n,) thrust, percent, that counts as full
+    full_thrust_percent: Array  # (n,) thrust, percent, that counts as full
     thrust_samples: IntArray  # (n,) path samples within which a boat regains its thrust
     fade: Array  # (n,) factor of negative margins against pursuers per path sample
     static_samples: IntArray  # (n,) samples until a half turn could be over
@@ -98,7 +98,7 @@ class Registered(NamedTuple):
     values: Array  # (k, MOST_VALUES) their present values, NaN beyond
     size: IntArray  # (k,) how many those are; -1: they are missing, and the barrier is unknown
     faults: IntArray  # (k,) how often they gave no usable margin in this decision
-    off_m: float  # how far off a boat may be, and how much a margin may fall short between two samples, m
+    uncertainty_m: float  # how far off a boat may be, and how much a margin may fall short between two samples, m
     late_s: float  # time until the commands take effect, s
 
 
@@ -106,10 +106,10 @@ MOST_VALUES = 64
 """Most values of one registered barrier."""
 
 
-def new_registered(count: int = 0, off_m: float = 0.0, late_s: float = 0.0) -> Registered:
+def new_registered(count: int = 0, uncertainty_m: float = 0.0, late_s: float = 0.0) -> Registered:
     """Return ``count`` barriers that are unknown so far."""
     values, size = np.full((count, MOST_VALUES), np.nan), np.full(count, -1)
-    return share(Registered(np.zeros(count, np.int64), values, size, np.zeros(count, np.int64), off_m, late_s))
+    return share(Registered(np.zeros(count, np.int64), values, size, np.zeros(count, np.int64), uncertainty_m, late_s))
 
 
 class Static(NamedTuple):
@@ -181,15 +181,15 @@ class Scene(NamedTuple):
     last_resort: Annotated[IntArray, "n"]  # what the hard line makes of each boat, see `filter.last_line`
     solver: Annotated[IntArray, "n"]  # what found the command, between nominal one and backup: `BY_QP` and the like
     slack_m: Annotated[Array, "n"]
-    violated: Annotated[IntArray, "n"]  # constraint that the nominal command violates, as in ``bound``; -1: none
-    group: Annotated[IntArray, "n"]  # see `filter.groups`
+    violated: Annotated[IntArray, "n"]  # constraint that the nominal command violates, as in ``active``; -1: none
+    group: Annotated[IntArray, "n"]  # see `filter.nominal`
     moving: Annotated[BoolArray, "n"]  # boats whose commands are being changed
     movers: Annotated[IntArray, "n"]  # their list,
     mover_of: Annotated[IntArray, "n"]  # and each boat's place in it, -1: none
     held: Annotated[Array, "n", 3]  # manoeuvre continued from other states: side, end heading deg (NaN), m/s
     verified: Annotated[Array, "n", 5]  # results of verified backups, see `filter.blend`
     # neighbours
-    near: Annotated[BoolArray, "n", "n"]  # pairs that can matter
+    neighbours: Annotated[BoolArray, "n", "n"]  # pairs that can matter
     inside_separation: Annotated[BoolArray, "n", "n"]  # pairs inside the separation
     radius: Annotated[Array, "n", "n"]  # required distance, m
     course: Annotated[Array, "n", 4]  # position one step ahead at present velocity, and heading as a unit vector
@@ -202,26 +202,26 @@ class Scene(NamedTuple):
     # required margins, m: of the nominal check, 0 while backups are assigned, then of `blend.rescore_backups`
     target: Annotated[Array, "n"]  # from boats that are not own
     teammate_target_m: Annotated[Array, "n"]  # from own boats
-    threat_target_m: Annotated[Array, "n", "n"]  # from each pursuing opponent
+    pursuit_target_m: Annotated[Array, "n", "n"]  # from each pursuing opponent
     joint_target_m: Annotated[Array, "n"]  # from several opponents rolled out
     static_target_m: Annotated[Array, "n"]  # from static constraints
     # manoeuvres held; row n: on trial
     manoeuvre: Annotated[Array, "n+1", 3]  # side, turn to go deg, speed m/s
     path: Annotated[Array, "n+1", "samples", 2]  # positions along it, or along the way of predicted boats
-    ready: Annotated[Array, "n+1", 3]  # notes on the path, see `backup.paths.READY_SAMPLE`
-    look: Annotated[Array, "n+1", 5]  # place at which the boat is looked up in tables
+    full_thrust: Annotated[Array, "n+1", 3]  # notes on the path, see `backup.paths.FULL_THRUST_SAMPLE`
+    table_place: Annotated[Array, "n+1", 5]  # place at which the boat is looked up in tables
     clear: Annotated[Array, "n+1", 4]  # clearance row of boats
     static_clear: Annotated[Array, "n+1", 4]  # clearance row of static constraints,
     static_by: Annotated[IntArray, "n+1"]  # which of them it is from,
     static_known: Annotated[BoolArray, "n+1"]  # and whether these belong to the present path
-    bound: Annotated[IntArray, "n+1"]  # active constraint: a boat, -1 none, -2 and below static ones
+    active: Annotated[IntArray, "n+1"]  # active constraint: a boat, -1 none, -2 and below static ones
     satisfied: Annotated[IntArray, "n"]  # level that it satisfies, see `backup.score`,
     score_m: Annotated[Array, "n"]  # and the other entry of its score
     violates_predicted: Annotated[BoolArray, "n+1"]  # whether the margin from one whose way is known falls short
     violates_pursuers: Annotated[BoolArray, "n+1"]  # the same against pursuers
-    threat_m: Annotated[Array, "n+1"]  # least margin against pursuers
-    threat_by: Annotated[IntArray, "n+1"]  # the opponent it is from, -1: none
-    threats_m: Annotated[Array, "n+1", "n"]  # margin from each, as far as they were checked
+    pursuit_margin_m: Annotated[Array, "n+1"]  # least margin against pursuers
+    pursuer: Annotated[IntArray, "n+1"]  # the opponent it is from, -1: none
+    pursuit_margins_m: Annotated[Array, "n+1", "n"]  # margin from each, as far as they were checked
     joint_m: Annotated[Array, "n+1"]  # least from several opponents rolled out
     table_m: Annotated[Array, "n+1"]  # least that tables give at the first lookup
     pursuers_known: Annotated[BoolArray, "n+1"]  # whether these are all, for the present path
@@ -232,8 +232,8 @@ class Scene(NamedTuple):
     stop_row: Annotated[Array, L.N_STATE]
     out: Annotated[Array, 4]
     scratch_clear: Annotated[Array, 4]
-    ways: Annotated[Array, "n", 3, 5]  # places at which an opponent may be when tables are looked up
-    lookup: Annotated[Array, "n", "n", 5]  # place of each boat at the last lookup of each opponent, and margin
+    opponent_places: Annotated[Array, "n", 3, 5]  # places at which an opponent may be when tables are looked up
+    table_cache: Annotated[Array, "n", "n", 5]  # place of each boat at the last lookup of each opponent, and margin
     runs: Annotated[Array, 2, N_RUN]  # rollouts of a pursuer: straight for the boat, and leading it
     turns: Annotated[Array, 6, 2]  # cosine and sine of its hardest turns in as many samples and fewer
     first_pursuer: Annotated[IntArray, "n"]  # opponent that is checked first,
@@ -303,7 +303,7 @@ def part_of(scene: Scene, static: Static, first: int, last: int, delay: int) -> 
 def new_memory(decisions: int, boats: int) -> Array:
     """Return memory, (B, n, N_MEMORY + n), of boats that hold no manoeuvre yet."""
     memories = np.zeros((decisions, boats, N_MEMORY + boats))
-    memories[..., BACKUP_SIDE], memories[..., BLOCKED_BY] = 1.0, -1.0
+    memories[..., BACKUP_RUDDER], memories[..., BLOCKED_BY] = 1.0, -1.0
     return memories
 
 

@@ -20,7 +20,7 @@ ROUNDED = 1e-5
 OWN_STOP = "send"
 """Condition of an action that declares a link's own stop for a boat with a decision. For `Reason.STOPPED` the shield
 itself requests that stop."""
-FIELDS = ("intervened", "reason", "safety_margin_m", "slack_m", "bound")
+FIELDS = ("intervened", "reason", "safety_margin_m", "slack_m", "active_constraint")
 """Arrays of a decision that are compared besides the filtered commands; its computing time is not."""
 
 

@@ -12,7 +12,17 @@ from ..platforms import layout as L
 from ..workspace import Scene, all_spent
 from .family import FAMILY, FOUND, IN_MEMORY, candidate, found_turn, remembered
 from .rollout import lay_placed, place_manoeuvre, roll_out
-from .score import ALL, OBSTACLES, OPPONENTS, WORST, Score, all_satisfy, better, is_no_better, score_path
+from .score import (
+    CLEAR_OF_ALL,
+    CLEAR_OF_BOATS,
+    CLEAR_OF_OBSTACLES,
+    WORST,
+    Score,
+    all_satisfy,
+    better,
+    is_no_better,
+    score_path,
+)
 
 SWEEPS = 2
 
@@ -23,24 +33,24 @@ def _take(i: int, slot: int, score: Score, scene: Scene) -> None:
     for k in range(scene.path.shape[1]):
         copy_row(scene.path[i, k], scene.path[slot, k])
     copy_row(scene.manoeuvre[i], scene.manoeuvre[slot])
-    copy_row(scene.look[i], scene.look[slot])
-    copy_row(scene.ready[i], scene.ready[slot])
+    copy_row(scene.table_place[i], scene.table_place[slot])
+    copy_row(scene.full_thrust[i], scene.full_thrust[slot])
     copy_row(scene.clear[i], scene.clear[slot])
     copy_row(scene.static_clear[i], scene.static_clear[slot])
     scene.static_known[i], scene.static_by[i] = scene.static_known[slot], scene.static_by[slot]
-    scene.threat_m[i] = scene.threat_m[slot]
+    scene.pursuit_margin_m[i] = scene.pursuit_margin_m[slot]
     scene.violates_pursuers[i] = scene.violates_pursuers[slot]
-    copy_row(scene.threats_m[i], scene.threats_m[slot])
+    copy_row(scene.pursuit_margins_m[i], scene.pursuit_margins_m[slot])
     scene.joint_m[i] = scene.joint_m[slot]
-    scene.threat_by[i] = scene.threat_by[slot]
+    scene.pursuer[i] = scene.pursuer[slot]
     scene.pursuers_known[i] = scene.pursuers_known[slot]
     scene.refused_by_table[i] = scene.refused_by_table[slot]
-    scene.bound[i] = scene.bound[slot]
+    scene.active[i] = scene.active[slot]
     scene.satisfied[i], scene.score_m[i] = score
 
 
 @lean_kernel
-def choose_manoeuvre(i: int, wanted_mps: float, done: int, best_of: bool, scene: Scene) -> None:
+def choose_manoeuvre(i: int, commanded_mps: float, ahead: int, best_of: bool, scene: Scene) -> None:
     """Give boat i a manoeuvre: the first that is safe, or with ``best_of`` the best.
 
     Equal scores go to the first in the family: starboard before port, as the rules of the road ask. If the manoeuvre
@@ -53,27 +63,27 @@ def choose_manoeuvre(i: int, wanted_mps: float, done: int, best_of: bool, scene:
     """
     state, boats = scene.state, scene.boats
     trial = state.shape[0]
-    heading = scene.next_state[i, L.HEADING] if done == 1 else state[i, L.HEADING]
+    heading = scene.next_state[i, L.HEADING] if ahead == 1 else state[i, L.HEADING]
     best = WORST
     violated = scene.violated[i]
-    compared = boats.table_steps[i] > 0 and done == 0 and violated >= 0 and not scene.ours[violated]
+    compared = boats.table_steps[i] > 0 and ahead == 0 and violated >= 0 and not scene.ours[violated]
     for p in range(boats.n_manoeuvres[i] + FAMILY):
-        if p == IN_MEMORY and not remembered(i, done, heading, scene):
+        if p == IN_MEMORY and not remembered(i, ahead, heading, scene):
             continue
-        if p == FOUND and (done == 1 or compared):
+        if p == FOUND and (ahead == 1 or compared):
             continue
-        if best.satisfied == ALL and (not best_of or (p == FAMILY and not compared)):
+        if best.satisfied == CLEAR_OF_ALL and (not best_of or (p == FAMILY and not compared)):
             return
-        place_manoeuvre(i, trial, candidate(i, p, wanted_mps, heading, scene), done, scene)
-        if done == 0 and is_no_better(i, trial, best, scene):
+        place_manoeuvre(i, trial, candidate(i, p, commanded_mps, heading, scene), ahead, scene)
+        if ahead == 0 and is_no_better(i, trial, best, scene):
             scene.spent[0] += scene.cost[i]
         else:
-            lay_placed(i, trial, done, scene)
+            lay_placed(i, trial, ahead, scene)
             score = score_path(i, trial, best, scene)
             if better(score, best):
                 best = score
                 _take(i, trial, score, scene)
-        if (done == 1 and scene.refused_by_table[trial]) or all_spent(scene):
+        if (ahead == 1 and scene.refused_by_table[trial]) or all_spent(scene):
             return
 
 
@@ -84,25 +94,25 @@ def refresh(i: int, scene: Scene) -> None:
 
 
 @lean_kernel
-def needs_no_search(i: int, sweep: int, done: int, scene: Scene) -> bool:
+def needs_no_search(i: int, sweep: int, ahead: int, scene: Scene) -> bool:
     """Return whether the search for boat i is over in this sweep, see `assign_manoeuvres`."""
     memory = scene.memory
     was_short = (
         memory[i, W.HAS_BACKUP] > 0.0
         and memory[i, W.BACKING_UP] > 0.0
-        and (memory[i, W.BACKUP_MARGIN] < 0.0 or scene.satisfied[i] >= OPPONENTS)
+        and (memory[i, W.BACKUP_MARGIN] < 0.0 or scene.satisfied[i] >= CLEAR_OF_BOATS)
     )
-    if scene.satisfied[i] == ALL or (sweep > 0 and scene.satisfied[i] >= OBSTACLES):
+    if scene.satisfied[i] == CLEAR_OF_ALL or (sweep > 0 and scene.satisfied[i] >= CLEAR_OF_OBSTACLES):
         return True
-    return done == 1 and was_short
+    return ahead == 1 and was_short
 
 
 @lean_kernel
 def note_manoeuvre(i: int, held: Array, scene: Scene) -> None:
-    """Note boat i's manoeuvre as seen from its predicted state: side, end heading (NaN: no turn), speed."""
-    side, togo = scene.manoeuvre[i, 0], scene.manoeuvre[i, 1]
-    held[i, 0], held[i, 2] = side, scene.manoeuvre[i, 2]
-    held[i, 1] = scene.next_state[i, L.HEADING] + math.copysign(togo, side) if togo > 0.0 else np.nan
+    """Note boat i's manoeuvre as seen from its predicted state: rudder, end heading (NaN: no turn), speed."""
+    rudder, togo = scene.manoeuvre[i, 0], scene.manoeuvre[i, 1]
+    held[i, 0], held[i, 2] = rudder, scene.manoeuvre[i, 2]
+    held[i, 1] = scene.next_state[i, L.HEADING] + math.copysign(togo, rudder) if togo > 0.0 else np.nan
 
 
 @lean_kernel
@@ -131,22 +141,22 @@ def recheck(scene: Scene) -> None:
 
 
 @lean_kernel
-def roll_out_first(scene: Scene, done: int, who: BoolArray) -> None:
+def roll_out_first(scene: Scene, ahead: int, who: BoolArray) -> None:
     """Give each boat of ``who`` a first manoeuvre: the remembered one, else the first of the family."""
     state = scene.state
     for i in range(state.shape[0]):
         if who[i] and scene.reason[i] == W.STOPPED:
-            roll_out(i, i, 1.0, 0.0, 0.0, done, scene)
+            roll_out(i, i, 1.0, 0.0, 0.0, ahead, scene)
         elif who[i]:
-            heading = scene.next_state[i, L.HEADING] if done == 1 else state[i, L.HEADING]
-            first = IN_MEMORY if remembered(i, done, heading, scene) else FAMILY
-            side, togo, speed = candidate(i, first, scene.command[i, 0], heading, scene)
-            roll_out(i, i, side, togo, speed, done, scene)
+            heading = scene.next_state[i, L.HEADING] if ahead == 1 else state[i, L.HEADING]
+            first = IN_MEMORY if remembered(i, ahead, heading, scene) else FAMILY
+            rudder, togo, speed = candidate(i, first, scene.command[i, 0], heading, scene)
+            roll_out(i, i, rudder, togo, speed, ahead, scene)
 
 
 @lean_kernel
-def assign_manoeuvres(scene: Scene, done: int, who: BoolArray) -> bool:
-    """Give the boats of ``who`` a manoeuvre from their predicted (done = 1) or present states (0).
+def assign_manoeuvres(scene: Scene, ahead: int, who: BoolArray) -> bool:
+    """Give the boats of ``who`` a manoeuvre from their predicted (ahead = 1) or present states (0).
 
     From predicted states the first safe manoeuvre is taken; from present ones, which are carried out, the best. Own
     boats outside ``who`` keep their paths. Some boats are not searched again one step ahead. A boat on its backup is
@@ -159,7 +169,7 @@ def assign_manoeuvres(scene: Scene, done: int, who: BoolArray) -> bool:
     """
     state, ours = scene.state, scene.ours
     n = state.shape[0]
-    roll_out_first(scene, done, who)
+    roll_out_first(scene, ahead, who)
     stale = True
     scene.searched[:] = -1
     changes = 0
@@ -168,16 +178,16 @@ def assign_manoeuvres(scene: Scene, done: int, who: BoolArray) -> bool:
         for i in range(n):
             if not who[i] or scene.reason[i] == W.STOPPED:
                 continue
-            best_of = done == 0 and sweep == 0
+            best_of = ahead == 0 and sweep == 0
             if not best_of:
                 refresh(i, scene)
-                if needs_no_search(i, sweep, done, scene) or all_spent(scene):
+                if needs_no_search(i, sweep, ahead, scene) or all_spent(scene):
                     continue
-            if scene.searched[i] == changes and not (done == 0 and sweep == 1):  # it would find the same again
+            if scene.searched[i] == changes and not (ahead == 0 and sweep == 1):  # it would find the same again
                 continue
-            side, togo, speed = scene.manoeuvre[i, 0], scene.manoeuvre[i, 1], scene.manoeuvre[i, 2]
-            choose_manoeuvre(i, scene.command[i, 0], done, best_of, scene)
-            if scene.manoeuvre[i, 0] != side or scene.manoeuvre[i, 1] != togo or scene.manoeuvre[i, 2] != speed:
+            rudder, togo, speed = scene.manoeuvre[i, 0], scene.manoeuvre[i, 1], scene.manoeuvre[i, 2]
+            choose_manoeuvre(i, scene.command[i, 0], ahead, best_of, scene)
+            if scene.manoeuvre[i, 0] != rudder or scene.manoeuvre[i, 1] != togo or scene.manoeuvre[i, 2] != speed:
                 changes += 1
             scene.searched[i] = changes
             changed = True
@@ -187,4 +197,4 @@ def assign_manoeuvres(scene: Scene, done: int, who: BoolArray) -> bool:
     for i in range(n):
         if ours[i] and (stale or not who[i] or scene.reason[i] == W.STOPPED):
             refresh(i, scene)
-    return all_satisfy(ALL, scene)
+    return all_satisfy(CLEAR_OF_ALL, scene)

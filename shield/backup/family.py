@@ -1,7 +1,7 @@
 """Opponent models by name: a family of backup manoeuvres, with opponents rolled out or looked up in value tables.
 
-A model's h is as in `barriers.boats`. Each row of a family is (side, turn deg, speed). Side is clockwise when > 0; its
-size is the share of full rudder. Speed is a fraction of top speed, or `COMMANDED`.
+A model's h is as in `barriers.boats`. Each row of a family is (rudder, turn deg, speed). The rudder is a share of
+full rudder, clockwise when > 0. Speed is a fraction of top speed, or `COMMANDED`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ..jit import Array, lean_kernel
 from ..platforms import Platform
 from ..platforms import layout as L
 from ..platforms.limits import Limits, limits_of
-from ..workspace import BACKUP_HEADING, BACKUP_SIDE, BACKUP_SPEED, HAS_BACKUP, Scene
+from ..workspace import BACKUP_HEADING, BACKUP_RUDDER, BACKUP_SPEED, HAS_BACKUP, Scene
 from .paths import angle_to_go
 
 IN_MEMORY, FOUND, FAMILY = range(3)
@@ -60,7 +60,7 @@ LONGEST_PURSUIT_S = 60.0
 
 @dataclass(frozen=True)
 class OpponentModel:
-    """Families of backup manoeuvres, rows of (side, turn deg, speed), with their horizon.
+    """Families of backup manoeuvres, rows of (rudder, turn deg, speed), with their horizon.
 
     Attributes:
         name: its name in settings.
@@ -109,7 +109,7 @@ def _turning(turns_deg: Sequence[float], gentle_shares: Sequence[float] = ()) ->
 
 def _slowing() -> Array:
     rows = [(1.0, 0.0, 0.5)]
-    rows += [(side, turn, v) for v in SLOWING_SPEEDS for turn in SLOWING_TURNS_DEG for side in (1.0, -1.0)]
+    rows += [(rudder, turn, v) for v in SLOWING_SPEEDS for turn in SLOWING_TURNS_DEG for rudder in (1.0, -1.0)]
     return np.array(rows)
 
 
@@ -139,11 +139,11 @@ OPPONENT_MODELS = {model.name: model for model in (AUTO, TURNING_CIRCLE, VALUE_T
 
 
 @lean_kernel
-def turn_left(heading_deg: float, target_deg: float, side: float) -> float:
-    """Return the turn left, deg, of a manoeuvre to one side that ends on a heading (NaN: no turn); 0 once past it."""
+def turn_left(heading_deg: float, target_deg: float, rudder: float) -> float:
+    """Return the turn left, deg, of a manoeuvre that ends on a heading (NaN: no turn); 0 once past it."""
     if math.isnan(target_deg):
         return 0.0
-    togo = angle_to_go(heading_deg, target_deg, side)
+    togo = angle_to_go(heading_deg, target_deg, rudder)
     return 0.0 if togo > DONE_DEG else togo
 
 
@@ -151,18 +151,18 @@ def turn_left(heading_deg: float, target_deg: float, side: float) -> float:
 def kept_turn(i: int, heading_deg: float, scene: Scene) -> float:
     """Return the turn left of the remembered manoeuvre, deg."""
     memory = scene.memory
-    return turn_left(heading_deg, memory[i, BACKUP_HEADING], memory[i, BACKUP_SIDE])
+    return turn_left(heading_deg, memory[i, BACKUP_HEADING], memory[i, BACKUP_RUDDER])
 
 
 @lean_kernel
-def remembered(i: int, done: int, heading_deg: float, scene: Scene) -> bool:
+def remembered(i: int, ahead: int, heading_deg: float, scene: Scene) -> bool:
     """Return whether the remembered manoeuvre can be offered.
 
     A boat whose commands turn it away from its manoeuvre for long is offered another in good time. A manoeuvre that is
     committed to must not pass the angle at which it counts as done, not even by the turn that a boat still makes.
     """
     memory = scene.memory
-    return memory[i, HAS_BACKUP] > 0.0 and (done == 0 or kept_turn(i, heading_deg, scene) <= FURTHEST_DEG)
+    return memory[i, HAS_BACKUP] > 0.0 and (ahead == 0 or kept_turn(i, heading_deg, scene) <= FURTHEST_DEG)
 
 
 @lean_kernel
@@ -172,13 +172,13 @@ def found_turn(i: int, heading_deg: float, held: Array) -> float:
 
 
 @lean_kernel
-def candidate(i: int, p: int, wanted_mps: float, heading_deg: float, scene: Scene) -> tuple[float, float, float]:
-    """Return manoeuvre p of boat i, `IN_MEMORY`, `FOUND` or one of the family: (side, turn deg, speed m/s)."""
+def candidate(i: int, p: int, commanded_mps: float, heading_deg: float, scene: Scene) -> tuple[float, float, float]:
+    """Return manoeuvre p of boat i, `IN_MEMORY`, `FOUND` or one of the family: (rudder, turn deg, speed m/s)."""
     boats, memory, held = scene.boats, scene.memory, scene.held
     if p == IN_MEMORY:
-        return memory[i, BACKUP_SIDE], kept_turn(i, heading_deg, scene), memory[i, BACKUP_SPEED]
+        return memory[i, BACKUP_RUDDER], kept_turn(i, heading_deg, scene), memory[i, BACKUP_SPEED]
     if p == FOUND:
         return held[i, 0], found_turn(i, heading_deg, held), held[i, 2]
     row = boats.manoeuvres[i, p - FAMILY]
-    speed = wanted_mps if row[2] == COMMANDED else row[2] * boats.params[i, L.MAX_SPEED]
+    speed = commanded_mps if row[2] == COMMANDED else row[2] * boats.params[i, L.MAX_SPEED]
     return row[0], row[1], speed

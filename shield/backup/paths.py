@@ -1,6 +1,6 @@
 """Paths of backup manoeuvres: a turn to one side, then straight on, at a set speed.
 
-The sign of ``side`` is the side, 1 clockwise. Its size, up to 1, is the share of full rudder in the turn.
+``rudder`` is the share of full rudder in the turn, clockwise when > 0.
 
 Paths are sampled every ``stride`` steps of the boat's model. Sample 0 is where the boat is one step from now: after
 the candidate command, or after the manoeuvre's own first step.
@@ -19,7 +19,7 @@ from ..platforms.usv import kept_share, next_thrust, speed_of_thrust, speed_towa
 SAG_M = 0.022
 """Largest distance between the arc sailed between two samples and the straight line, m."""
 
-READY_SAMPLE, READY_HEADING, READY_SPEED = range(3)
+FULL_THRUST_SAMPLE, FULL_THRUST_HEADING, FULL_THRUST_SPEED = range(3)
 """Notes on a path: the sample where thrust is full (-1: never), heading, rad, and speed, m/s, there."""
 
 STEADY_SPEED = 1e-4
@@ -38,12 +38,12 @@ class Manoeuvre(NamedTuple):
     """A turn to one side, then straight on.
 
     Attributes:
-        side: clockwise when > 0; its size is the share of full rudder.
+        rudder: share of full rudder in the turn, clockwise when > 0.
         togo_deg: turn left before running straight, deg, >= 0.
         speed_mps: speed commanded throughout, m/s.
     """
 
-    side: float
+    rudder: float
     togo_deg: float
     speed_mps: float
 
@@ -53,24 +53,24 @@ class Span(NamedTuple):
 
     Attributes:
         dt_s: model step, s.
-        done: 0 if the manoeuvre starts in the present state. Else it starts in the state so many steps from now, and
+        ahead: 0 if the manoeuvre starts in the present state. Else it starts in the state so many steps from now, and
             the samples until then are already written (the first, of one step, is written with the rest).
         stride: model steps between samples.
         samples: number of samples after sample 0.
         least: number of samples after which the path may end.
         beyond: number of samples for which the path continues after the one where thrust is full.
         earliest: first sample at which full thrust counts, at most ``samples``.
-        ready_thrust: thrust, percent, that counts as full.
+        full_thrust_percent: thrust, percent, that counts as full.
     """
 
     dt_s: float
-    done: int
+    ahead: int
     stride: int
     samples: int
     least: int
     beyond: int
     earliest: int
-    ready_thrust: float
+    full_thrust_percent: float
 
 
 class Straight(NamedTuple):
@@ -120,18 +120,18 @@ class Settling(NamedTuple):
 
 
 @lean_kernel
-def angle_to_go(heading_deg: float, target_deg: float, side: float) -> float:
-    """Return the turn, deg in [0, 360), to a heading, going clockwise (side > 0) or the other way (< 0)."""
-    return ((target_deg - heading_deg) * math.copysign(1.0, side)) % 360.0
+def angle_to_go(heading_deg: float, target_deg: float, rudder: float) -> float:
+    """Return the turn, deg in [0, 360), to a heading, going clockwise (rudder > 0) or the other way (< 0)."""
+    return ((target_deg - heading_deg) * math.copysign(1.0, rudder)) % 360.0
 
 
 @lean_kernel
-def sail(params: Array, row: Array, side: float, togo_deg: float, speed_mps: float, dt_s: float) -> float:
+def sail(params: Array, row: Array, rudder: float, togo_deg: float, speed_mps: float, dt_s: float) -> float:
     """Make one model step of a backup manoeuvre on ``row``, in place; return the turn left, deg."""
-    before, sign = row[L.HEADING], math.copysign(1.0, side)
+    before, sign = row[L.HEADING], math.copysign(1.0, rudder)
     turn = togo_deg
-    if togo_deg > 0.0 and abs(side) < 1.0:
-        turn = min(togo_deg, abs(side) * full_turn(params, row, speed_mps, dt_s))
+    if togo_deg > 0.0 and abs(rudder) < 1.0:
+        turn = min(togo_deg, abs(rudder) * full_turn(params, row, speed_mps, dt_s))
     actuate(params, row, speed_mps, sign * turn, dt_s)
     if togo_deg <= 0.0:
         return 0.0
@@ -143,42 +143,43 @@ def sail(params: Array, row: Array, side: float, togo_deg: float, speed_mps: flo
 
 
 @lean_kernel
-def _note_sample(k: int, at: Straight, speed_mps: float, thrust: float, span: Span, path: Array, ready: Array) -> None:
+def _note_sample(
+    k: int, at: Straight, speed_mps: float, thrust: float, span: Span, path: Array, full_thrust: Array
+) -> None:
     """Write sample k; note if it is the first, from the earliest that counts, at which thrust is full."""
     path[k, 0], path[k, 1] = at.x, at.y
-    if ready[READY_SAMPLE] < 0.0 and k >= span.earliest and thrust >= span.ready_thrust:
-        ready[READY_SAMPLE], ready[READY_HEADING], ready[READY_SPEED] = k, math.atan2(at.ux, at.uy), speed_mps
+    if full_thrust[FULL_THRUST_SAMPLE] < 0.0 and k >= span.earliest and thrust >= span.full_thrust_percent:
+        full_thrust[0], full_thrust[1], full_thrust[2] = k, math.atan2(at.ux, at.uy), speed_mps
 
 
 @lean_kernel
-def _note_state(k: int, span: Span, row: Array, path: Array, ready: Array) -> None:
+def _note_state(k: int, span: Span, row: Array, path: Array, full_thrust: Array) -> None:
     """Write sample k from a state."""
     path[k, 0], path[k, 1] = row[L.X], row[L.Y]
-    if ready[READY_SAMPLE] < 0.0 and k >= span.earliest and row[L.THRUST] >= span.ready_thrust:
-        ready[READY_SAMPLE], ready[READY_SPEED] = k, row[L.SPEED]
-        ready[READY_HEADING] = math.radians(row[L.HEADING])
+    if full_thrust[FULL_THRUST_SAMPLE] < 0.0 and k >= span.earliest and row[L.THRUST] >= span.full_thrust_percent:
+        full_thrust[0], full_thrust[1], full_thrust[2] = k, math.radians(row[L.HEADING]), row[L.SPEED]
 
 
 @lean_kernel
-def _note_done(done: int, span: Span, row: Array, path: Array, ready: Array) -> tuple[int, int]:
-    """Write the sample of the state ``done`` steps ahead, if one is due; return the next sample and the step."""
-    step = done - 1
+def _note_done(ahead: int, span: Span, row: Array, path: Array, full_thrust: Array) -> tuple[int, int]:
+    """Write the sample of the state ``ahead`` steps from now, if one is due; return the next sample and the step."""
+    step = ahead - 1
     k = step // span.stride
     if step % span.stride == 0:
-        _note_state(k, span, row, path, ready)
+        _note_state(k, span, row, path, full_thrust)
     return k + 1, step
 
 
 @lean_kernel
-def _last_sample(span: Span, ready: Array) -> int:
+def _last_sample(span: Span, full_thrust: Array) -> int:
     """Return the last sample of a path, as far as it is known."""
-    if ready[READY_SAMPLE] < 0.0:
+    if full_thrust[FULL_THRUST_SAMPLE] < 0.0:
         return span.samples
-    return min(span.samples, max(span.least, int(ready[READY_SAMPLE]) + span.beyond))
+    return min(span.samples, max(span.least, int(full_thrust[FULL_THRUST_SAMPLE]) + span.beyond))
 
 
 @lean_kernel
-def trace_path(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path: Array, ready: Array) -> None:
+def trace_path(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path: Array, full_thrust: Array) -> None:
     """Write positions, m, along a manoeuvre to ``path[: span.samples + 1]``, or fewer, see ``least`` and ``beyond``.
 
     Args:
@@ -187,21 +188,21 @@ def trace_path(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path
         manoeuvre: the manoeuvre.
         span: what is written.
         path: shape (>= samples + 1, 2), float64.
-        ready: shape (3,), notes on the path, see `READY_SAMPLE`.
+        full_thrust: shape (3,), notes on the path, see `FULL_THRUST_SAMPLE`.
     """
-    ready[READY_SAMPLE] = -1.0
+    full_thrust[FULL_THRUST_SAMPLE] = -1.0
     if params[L.KIND] == L.KIND_USV and params[L.ROTATE_SPEED] == 0.0:
-        _trace_usv(params, row, manoeuvre, span, path, ready)
+        _trace_usv(params, row, manoeuvre, span, path, full_thrust)
         return
-    side, togo_deg, speed_mps, dt_s = manoeuvre.side, manoeuvre.togo_deg, manoeuvre.speed_mps, span.dt_s
-    if span.done == 0:
-        togo_deg = sail(params, row, side, togo_deg, speed_mps, dt_s)
-    k, step = _note_done(max(1, span.done), span, row, path, ready)
-    while k <= _last_sample(span, ready):
-        togo_deg = sail(params, row, side, togo_deg, speed_mps, dt_s)
+    rudder, togo_deg, speed_mps, dt_s = manoeuvre.rudder, manoeuvre.togo_deg, manoeuvre.speed_mps, span.dt_s
+    if span.ahead == 0:
+        togo_deg = sail(params, row, rudder, togo_deg, speed_mps, dt_s)
+    k, step = _note_done(max(1, span.ahead), span, row, path, full_thrust)
+    while k <= _last_sample(span, full_thrust):
+        togo_deg = sail(params, row, rudder, togo_deg, speed_mps, dt_s)
         step += 1
         if step % span.stride == 0:
-            _note_state(k, span, row, path, ready)
+            _note_state(k, span, row, path, full_thrust)
             k += 1
 
 
@@ -224,21 +225,21 @@ def _turn_of_step(at: AtThrust, togo_deg: float, most: float, params: Array) -> 
 
 
 @lean_kernel
-def _trace_usv(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path: Array, ready: Array) -> None:
+def _trace_usv(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path: Array, full_thrust: Array) -> None:
     """Do the work of `trace_path` for thrust boats: the same model in local variables, the heading as a unit vector.
 
     The turn of a step combines rudder, thrust and sign. The rudder is held until less than a step's turn is left; the
     last step ends on the mark. The boat moves along the mean heading of a step, half its turn from the old one. With
     `sail` alone, decisions take 1.4 times as long (42 scenes of 50 decisions), and differ by rounding.
     """
-    side, togo_deg, speed_mps, dt_s = manoeuvre.side, manoeuvre.togo_deg, manoeuvre.speed_mps, span.dt_s
+    rudder, togo_deg, speed_mps, dt_s = manoeuvre.rudder, manoeuvre.togo_deg, manoeuvre.speed_mps, span.dt_s
     x, y, v, heading = row[L.X], row[L.Y], row[L.SPEED], math.radians(row[L.HEADING])
     thrust, error, integral = row[L.THRUST], row[L.SPEED_ERROR], row[L.SPEED_INTEGRAL]
     ux, uy, top = math.sin(heading), math.cos(heading), params[L.MAX_SPEED]
-    most, sign = held_rudder(params) * abs(side), math.copysign(1.0, side)
+    most, sign = held_rudder(params) * abs(rudder), math.copysign(1.0, rudder)
     at, half, gains = AtThrust(math.nan, 0.0, 0.0, 0.0), HalfTurn(0.0, 1.0, 0.0), (0.0, 0.0, 0.0)
-    k, step = _note_done(span.done, span, row, path, ready) if span.done > 0 else (0, -1)
-    while k <= _last_sample(span, ready):
+    k, step = _note_done(span.ahead, span, row, path, full_thrust) if span.ahead > 0 else (0, -1)
+    while k <= _last_sample(span, full_thrust):
         last = thrust
         thrust, error, integral = next_thrust(params, v, thrust, error, integral, speed_mps, dt_s)
         if thrust != at.thrust:
@@ -260,12 +261,12 @@ def _trace_usv(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path
         if step % span.stride != 0:
             continue
         pose = Straight(x, y, ux, uy)
-        _note_sample(k, pose, v, thrust, span, path, ready)
+        _note_sample(k, pose, v, thrust, span, path, full_thrust)
         k += 1
         if togo_deg <= 0.0 and turn == 0.0:
             end = _settling(v, min(speed_mps, top), gains, thrust, thrust - last, params)
             if end.short_mps >= 0.0:
-                _run_on(pose, end, k, span, path, ready)
+                _run_on(pose, end, k, span, path, full_thrust)
                 return
 
 
@@ -319,7 +320,7 @@ def _settling(
 
 
 @lean_kernel
-def _run_on(run: Straight, end: Settling, k: int, span: Span, path: Array, ready: Array) -> None:
+def _run_on(run: Straight, end: Settling, k: int, span: Span, path: Array, full_thrust: Array) -> None:
     """Fill the rest of a path, from sample k, with a straight run as its speed settles: this needs no model."""
     left, missed_s = 1.0, 0.0  # share of the shortfall left after a sample; and its integral over one, s
     for _ in range(span.stride):
@@ -327,7 +328,7 @@ def _run_on(run: Straight, end: Settling, k: int, span: Span, path: Array, ready
         missed_s += left * span.dt_s
     way_m, most_m = 0.0, end.speed_mps * span.stride * span.dt_s
     short_mps, short_thrust = end.short_mps, end.short_thrust
-    last = _last_sample(span, ready)
+    last = _last_sample(span, full_thrust)
     while k <= last:
         if end.fall_mps == 0.0:
             way_m += most_m - short_mps * missed_s
@@ -338,6 +339,6 @@ def _run_on(run: Straight, end: Settling, k: int, span: Span, path: Array, ready
                 way_m += (end.speed_mps - short_mps) * span.dt_s
         short_thrust *= left
         pose = Straight(run.x + way_m * run.ux, run.y + way_m * run.uy, run.ux, run.uy)
-        _note_sample(k, pose, end.speed_mps - short_mps, end.thrust - short_thrust, span, path, ready)
-        last = _last_sample(span, ready)
+        _note_sample(k, pose, end.speed_mps - short_mps, end.thrust - short_thrust, span, path, full_thrust)
+        last = _last_sample(span, full_thrust)
         k += 1

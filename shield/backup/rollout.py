@@ -10,7 +10,7 @@ from ..platforms.step import step_boat
 from ..workspace import Scene
 from .paths import Manoeuvre, Span, trace_path
 
-NO_PURSUERS, PURSUERS_TILL_READY, PURSUERS = range(3)
+NO_PURSUERS, PURSUERS_TILL_FULL_THRUST, PURSUERS = range(3)
 """How far pursuers are rolled out: not at all; until tables answer (thrust is back; for a while if several); or to the
 end of the pursuit."""
 
@@ -21,14 +21,14 @@ def pursuit_extent(i: int, slot: int, scene: Scene) -> int:
     boats = scene.boats
     if not scene.pursued[i] or boats.table_steps[i] == 0:
         return PURSUERS if scene.pursued[i] else NO_PURSUERS
-    how = PURSUERS_TILL_READY if scene.several_pursuers[i] else NO_PURSUERS
-    for j in range(scene.near.shape[0]):
-        if j == i or not scene.near[i, j] or boats.team[i] == boats.team[j] or not may_pursue(j, scene):
+    how = PURSUERS_TILL_FULL_THRUST if scene.several_pursuers[i] else NO_PURSUERS
+    for j in range(scene.neighbours.shape[0]):
+        if j == i or not scene.neighbours[i, j] or boats.team[i] == boats.team[j] or not may_pursue(j, scene):
             continue
         if not tabled(i, j, scene):
             return PURSUERS
         if not table_answers(i, j, slot, scene):
-            how = PURSUERS_TILL_READY
+            how = PURSUERS_TILL_FULL_THRUST
     return how
 
 
@@ -47,44 +47,44 @@ def _roll_out_command(i: int, slot: int, scene: Scene) -> None:
 
 
 @lean_kernel
-def roll_out(i: int, slot: int, side: float, togo_deg: float, speed_mps: float, done: int, scene: Scene) -> None:
-    """Roll a manoeuvre of boat i out into ``slot``, from its predicted state (done = 1) or its present one (0)."""
-    place_manoeuvre(i, slot, (side, togo_deg, speed_mps), done, scene)
-    lay_placed(i, slot, done, scene)
+def roll_out(i: int, slot: int, rudder: float, togo_deg: float, speed_mps: float, ahead: int, scene: Scene) -> None:
+    """Roll a manoeuvre of boat i out into ``slot``, from its predicted state (ahead = 1) or its present one (0)."""
+    place_manoeuvre(i, slot, (rudder, togo_deg, speed_mps), ahead, scene)
+    lay_placed(i, slot, ahead, scene)
 
 
 @lean_kernel
-def place_manoeuvre(i: int, slot: int, manoeuvre: tuple[float, float, float], done: int, scene: Scene) -> None:
-    """Write a manoeuvre of boat i (side, turn to go deg, speed m/s) into ``slot``, and where it is looked up."""
-    side, togo_deg, speed_mps = manoeuvre
-    scene.manoeuvre[slot, 0], scene.manoeuvre[slot, 1], scene.manoeuvre[slot, 2] = side, togo_deg, speed_mps
+def place_manoeuvre(i: int, slot: int, manoeuvre: tuple[float, float, float], ahead: int, scene: Scene) -> None:
+    """Write a manoeuvre of boat i (rudder, turn to go deg, speed m/s) into ``slot``, and where it is looked up."""
+    rudder, togo_deg, speed_mps = manoeuvre
+    scene.manoeuvre[slot, 0], scene.manoeuvre[slot, 1], scene.manoeuvre[slot, 2] = rudder, togo_deg, speed_mps
     scene.pursuers_known[slot], scene.static_known[slot] = False, False
-    set_place(i, slot, side, togo_deg, speed_mps, done, scene)
+    set_place(i, slot, rudder, togo_deg, speed_mps, ahead, scene)
 
 
 @lean_kernel
-def lay_placed(i: int, slot: int, done: int, scene: Scene) -> None:
+def lay_placed(i: int, slot: int, ahead: int, scene: Scene) -> None:
     """Roll out the manoeuvre that was placed in ``slot``."""
     boats, tuning, manoeuvre = scene.boats, scene.tuning, scene.manoeuvre[slot]
     how = pursuit_extent(i, slot, scene)
     samples, chased = boats.longest_samples, boats.pursuit_samples[i] + boats.chased_samples[i]
     if how != NO_PURSUERS:
         samples = max(samples, chased + boats.thrust_samples[i])
-    earliest = 0 if done == 1 else (boats.table_steps[i] + boats.stride - 1) // boats.stride
+    earliest = 0 if ahead == 1 else (boats.table_steps[i] + boats.stride - 1) // boats.stride
     if scene.several_pursuers[i]:
         earliest = max(earliest, boats.joint_samples)
-    if done == 1:
+    if ahead == 1:
         _roll_out_command(i, slot, scene)
-    copy_row(scene.row, scene.next_state[i] if done == 1 else scene.state[i])
+    copy_row(scene.row, scene.next_state[i] if ahead == 1 else scene.state[i])
     span = Span(
         tuning.model_s,
-        tuning.moves if done == 1 else 0,
+        tuning.moves if ahead == 1 else 0,
         boats.stride,
         samples,
         boats.longest_samples,
         chased if how == PURSUERS else 0,
         min(earliest, samples),
-        boats.ready_thrust[i],
+        boats.full_thrust_percent[i],
     )
     told = Manoeuvre(manoeuvre[0], manoeuvre[1], manoeuvre[2])
-    trace_path(boats.params[i], scene.row, told, span, scene.path[slot], scene.ready[slot])
+    trace_path(boats.params[i], scene.row, told, span, scene.path[slot], scene.full_thrust[slot])

@@ -11,7 +11,7 @@ from ..barriers.static import clear_of_near_obstacles, clear_of_static
 from ..jit import lean_kernel
 from ..workspace import Scene
 
-NOTHING, BOATS, OBSTACLES, OPPONENTS, ALL = range(5)
+CLEAR_OF_NONE, CLEAR_OF_KNOWN, CLEAR_OF_OBSTACLES, CLEAR_OF_BOATS, CLEAR_OF_ALL = range(5)
 """Levels of a score, each with all before it: clear of teammates and of opponents that hold their course; clear of
 obstacles near in time; the required margins from all boats, pursuers included; those from static constraints."""
 
@@ -29,17 +29,17 @@ class Score(NamedTuple):
     """Score of a manoeuvre; more is better, entry by entry.
 
     Attributes:
-        satisfied: the last level that is satisfied, `NOTHING` to `ALL`.
-        score_m: decides within a level, m. For `NOTHING` and `OBSTACLES`: the least margin from boats. For `BOATS`: the
-            margin from obstacles. For `OPPONENTS`: the margin from static constraints less the required one. For `ALL`:
-            the margin to spare from boats.
+        satisfied: the last level that is satisfied, `CLEAR_OF_NONE` to `CLEAR_OF_ALL`.
+        score_m: decides within a level, m. For `CLEAR_OF_NONE` and `CLEAR_OF_OBSTACLES`: the least margin from boats.
+            For `CLEAR_OF_KNOWN`: the margin from obstacles. For `CLEAR_OF_BOATS`: the margin from static constraints
+            less the required one. For `CLEAR_OF_ALL`: the margin to spare from boats.
     """
 
     satisfied: int
     score_m: float
 
 
-WORST = Score(NOTHING, -1e9)
+WORST = Score(CLEAR_OF_NONE, -1e9)
 """A score that every manoeuvre reaches."""
 
 
@@ -60,15 +60,15 @@ def score_of(i: int, scene: Scene) -> Score:
 @lean_kernel
 def level_to_beat(best: Score) -> float:
     """Return the margin against pursuers, m, at which a manoeuvre that violates it is no better than the best."""
-    if best.satisfied > OBSTACLES:
+    if best.satisfied > CLEAR_OF_OBSTACLES:
         return FAR
-    return best.score_m if best.satisfied == OBSTACLES else -FAR
+    return best.score_m if best.satisfied == CLEAR_OF_OBSTACLES else -FAR
 
 
 @lean_kernel
 def least_to_beat(best: Score) -> float:
     """Return the margin, m, below which a manoeuvre is no better than the best, whatever else it satisfies."""
-    return best.score_m + SAME_M if best.satisfied == ALL else -FAR
+    return best.score_m + SAME_M if best.satisfied == CLEAR_OF_ALL else -FAR
 
 
 @lean_kernel
@@ -82,7 +82,7 @@ def is_no_better(i: int, slot: int, best: Score, scene: Scene) -> bool:
 def _skip_pursuers(slot: int, scene: Scene) -> None:
     """Set margins of a path whose pursuers do not matter: none exceeds the margin from the other boats."""
     margin = scene.clear[slot, MARGIN]
-    scene.threat_m[slot], scene.threats_m[slot, :], scene.joint_m[slot] = margin, margin, FAR
+    scene.pursuit_margin_m[slot], scene.pursuit_margins_m[slot, :], scene.joint_m[slot] = margin, margin, FAR
     scene.refused_by_table[slot], scene.pursuers_known[slot] = False, False
 
 
@@ -90,13 +90,13 @@ def _skip_pursuers(slot: int, scene: Scene) -> None:
 def _score_if_clear(i: int, slot: int, scene: Scene) -> Score:
     """Return the score of a path that satisfies all margins from boats, by static and boats' margins in ``slot``."""
     if not scene.static_known[slot]:
-        scene.static_known[slot], scene.static_by[slot] = (
-            True,
-            clear_of_static(i, slot, scene, scene.static_clear[slot]),
-        )
+        scene.static_known[slot] = True
+        scene.static_by[slot] = clear_of_static(i, slot, scene, scene.static_clear[slot])
     to_spare_m = scene.static_clear[slot, MARGIN] - scene.static_target_m[i]
     spare_m = min(scene.clear[slot, MARGIN], scene.tuning.margin_cap_m)
-    return Score(ALL, spare_m) if to_spare_m >= 0.0 else Score(OPPONENTS, to_spare_m + SPARE_SCORE * spare_m)
+    if to_spare_m >= 0.0:
+        return Score(CLEAR_OF_ALL, spare_m)
+    return Score(CLEAR_OF_BOATS, to_spare_m + SPARE_SCORE * spare_m)
 
 
 @lean_kernel
@@ -110,34 +110,35 @@ def score_path(i: int, slot: int, best: Score, scene: Scene) -> Score:
     scene.spent[0] += scene.cost[i]
     clear = scene.clear[slot]
     least_m = least_to_beat(best)
-    worst_clearance(i, slot, scene, best.score_m if best.satisfied == NOTHING else max(0.0, least_m))
+    worst_clearance(i, slot, scene, best.score_m if best.satisfied == CLEAR_OF_NONE else max(0.0, least_m))
     if not clear[MARGIN] >= 0.0:
         _skip_pursuers(slot, scene)
-        return Score(NOTHING, clear[MARGIN])
+        return Score(CLEAR_OF_NONE, clear[MARGIN])
     touched = clear_of_near_obstacles(i, slot, scene, 0.0, scene.scratch_clear)
     if not scene.scratch_clear[MARGIN] >= 0.0:
-        score = Score(BOATS, scene.scratch_clear[MARGIN] + LATER_SCORE_M * scene.scratch_clear[SAMPLE])
+        score = Score(CLEAR_OF_KNOWN, scene.scratch_clear[MARGIN] + LATER_SCORE_M * scene.scratch_clear[SAMPLE])
         if better(score, best):
             worst_pursuer(i, slot, -FAR, -FAR, scene)
         else:
             _skip_pursuers(slot, scene)
-        scene.refused_by_table[slot], scene.bound[slot] = False, touched
+        scene.refused_by_table[slot], scene.active[slot] = False, touched
         return score
     sure_m, short = clear[MARGIN], scene.violates_predicted[slot]
-    if short and not better(Score(OBSTACLES, sure_m), best):
+    if short and not better(Score(CLEAR_OF_OBSTACLES, sure_m), best):
         _skip_pursuers(slot, scene)
-        return Score(OBSTACLES, sure_m)
-    if best.satisfied > OBSTACLES:  # what static constraints say is found sooner than what pursuers may do
+        return Score(CLEAR_OF_OBSTACLES, sure_m)
+    if best.satisfied > CLEAR_OF_OBSTACLES:  # what static constraints say is found sooner than what pursuers may do
         score = _score_if_clear(i, slot, scene)
         if not better(score, best):
             _skip_pursuers(slot, scene)
             return score
     worst_pursuer(i, slot, level_to_beat(best), least_m, scene)
     if short or scene.violates_pursuers[slot]:
-        return Score(OBSTACLES, min(sure_m, scene.threat_m[slot]) if short else scene.threat_m[slot])
+        pursuit_m = scene.pursuit_margin_m[slot]
+        return Score(CLEAR_OF_OBSTACLES, min(sure_m, pursuit_m) if short else pursuit_m)
     score = _score_if_clear(i, slot, scene)
-    if score.satisfied < ALL:
-        scene.bound[slot] = scene.static_by[slot]
+    if score.satisfied < CLEAR_OF_ALL:
+        scene.active[slot] = scene.static_by[slot]
     return score
 
 

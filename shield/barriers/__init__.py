@@ -8,7 +8,7 @@ where the QP needs them). From `boats` and `static`, `filter.qp` derives gradien
     pursuit           the worst pursuing opponent
     value_function    the worst opponent, looked up in a value table
     static            the worst static constraint or registered barrier over a path; each has a number, and a margin
-                      and gradient by place: of a circle, wall or edge (`shapes`)
+                      and gradient by place: of a circle, wall or edge
     registered        barriers written by users, see `register_barrier`
 """
 

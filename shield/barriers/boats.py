@@ -33,7 +33,7 @@ def reported_margin(i: int, scene: Scene) -> float:
     state = scene.state
     least, in_breach = FAR, False
     for j in range(state.shape[0]):
-        if j != i and scene.near[i, j] and scene.inside_separation[i, j]:
+        if j != i and scene.neighbours[i, j] and scene.inside_separation[i, j]:
             in_breach = True
             gap = math.hypot(state[i, L.X] - state[j, L.X], state[i, L.Y] - state[j, L.Y])
             least = min(least, gap - scene.radius[i, j])
@@ -77,11 +77,11 @@ def worst_clearance(i: int, slot: int, scene: Scene, floor_m: float) -> None:
     state, tuning = scene.state, scene.tuning
     clear = scene.clear[slot]
     clear[MARGIN] = FAR
-    scene.bound[slot] = -1
+    scene.active[slot] = -1
     scene.violates_predicted[slot] = False
     shortest_m = 0.0
     for j in range(state.shape[0]):
-        if j == i or not scene.near[i, j]:
+        if j == i or not scene.neighbours[i, j]:
             continue
         least_m = required_margin_m(i, j, scene)
         enough_m = max(least_m + ROUNDING_M, min(clear[MARGIN], tuning.margin_cap_m))
@@ -90,10 +90,10 @@ def worst_clearance(i: int, slot: int, scene: Scene, floor_m: float) -> None:
         if lacks_m < shortest_m:
             scene.violates_predicted[slot], shortest_m = True, lacks_m
             if clear[MARGIN] >= 0.0:
-                scene.bound[slot] = j
+                scene.active[slot] = j
         if scene.out[MARGIN] < clear[MARGIN]:
             copy_row(clear, scene.out)
             if not scene.violates_predicted[slot] or clear[MARGIN] < 0.0:
-                scene.bound[slot] = j
+                scene.active[slot] = j
             if clear[MARGIN] < floor_m:
                 return

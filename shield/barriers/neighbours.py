@@ -68,7 +68,7 @@ def _note_pair(i: int, j: int, scene: Scene) -> None:
     square = dx * dx + dy * dy
     reach = radius + top * ((samples + 1) * boats.sample_s + tuning.straight_horizon_s)
     near = square <= reach * reach
-    scene.near[i, j], scene.near[j, i] = near, near
+    scene.neighbours[i, j], scene.neighbours[j, i] = near, near
     if not near:
         return
     cost = 1.0 + (PURSUER_COST if opponents else 0.0)
@@ -96,7 +96,7 @@ def _reach_samples(i: int, scene: Scene) -> int:
     least, _, _ = next_thrust(
         boats.params[i], row[L.SPEED], row[L.THRUST], row[L.SPEED_ERROR], row[L.SPEED_INTEGRAL], 0.0, tuning.model_s
     )
-    if boats.table_steps[i] == 0 and min(least, row[L.THRUST]) >= boats.ready_thrust[i]:
+    if boats.table_steps[i] == 0 and min(least, row[L.THRUST]) >= boats.full_thrust_percent[i]:
         return boats.pursuit_samples[i]
     return boats.pursuit_samples[i] + boats.thrust_samples[i]
 
@@ -147,7 +147,7 @@ def _near_ours(j: int, scene: Scene) -> bool:
     """Return whether boat j can matter to an own boat."""
     near = False
     for i in range(scene.ours.shape[0]):
-        near = near or (scene.ours[i] and scene.near[i, j])
+        near = near or (scene.ours[i] and scene.neighbours[i, j])
     return near
 
 

@@ -6,14 +6,14 @@ import math
 from typing import NamedTuple
 
 from .. import workspace as W
-from ..backup.paths import READY_SAMPLE
+from ..backup.paths import FULL_THRUST_SAMPLE
 from ..jit import Array, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..tables.lookup import WHOLE_S
 from ..workspace import Scene
 from .clearance import FAR, MARGIN, nearest_on
 from .neighbours import may_pursue
-from .value_function import adversarial_for, beyond_table, margin_when_ready, table_answers, tabled, worst_at_once
+from .value_function import adversarial_for, beyond_table, margin_at_full_thrust, table_answers, tabled, worst_at_once
 
 RUDDERS = (1.0, 0.6, 0.3, 0.0)
 """Rudders of the pursuers that are rolled out: shares of the hardest turn that they are assumed to make.
@@ -150,7 +150,7 @@ def _pursuit_of(i: int, j: int, slot: int, lasts: int, closely: int, to_table: b
     any.
     """
     boats = scene.boats
-    samples = min(lasts, int(scene.ready[slot, READY_SAMPLE])) if to_table else lasts
+    samples = min(lasts, int(scene.full_thrust[slot, FULL_THRUST_SAMPLE])) if to_table else lasts
     horizon_s = adversarial_for(i, j, scene.state[i, L.SPEED], scene)
     own_mps = max(boats.fastest_mps[i], scene.state[i, L.SPEED])
     return Pursuit(
@@ -259,7 +259,7 @@ def _run_pursuers(i: int, j: int, slot: int, rudder: int, pursuit: Pursuit, floo
     if not pursuit.to_table or worst_m < floor_m:
         return worst_m
     for lead in range(2):
-        value_m = margin_when_ready(i, j, slot, runs[lead], scene)
+        value_m = margin_at_full_thrust(i, j, slot, runs[lead], scene)
         worst_m = min(worst_m, value_m * runs[lead, W.RUN_WEIGHT] if value_m < 0.0 else value_m)
     return worst_m
 
@@ -274,11 +274,11 @@ def clear_of_pursuer(i: int, j: int, slot: int, floor_m: float, scene: Scene) ->
     thrust is full; for a boat with several pursuers (see `value_function.find_several_pursuers`) not before
     ``boats.joint_samples``.
     """
-    boats, ready = scene.boats, int(scene.ready[slot, READY_SAMPLE])
-    to_table = ready >= 0 and tabled(i, j, scene)
+    boats, sample = scene.boats, int(scene.full_thrust[slot, FULL_THRUST_SAMPLE])
+    to_table = sample >= 0 and tabled(i, j, scene)
     closely = boats.pursuit_samples[i] + boats.thrust_samples[i]
-    if ready >= 0:
-        closely = min(closely, ready + boats.pursuit_samples[i])
+    if sample >= 0:
+        closely = min(closely, sample + boats.pursuit_samples[i])
     lasts = closely + (0 if to_table else boats.chase_samples[i, j])
     if to_table and beyond_table(i, j, slot, scene):
         return scene.tuning.margin_cap_m
@@ -307,18 +307,18 @@ def _first_then_rest(first: int, number: int) -> int:
 @lean_kernel
 def _note(margin_m: float, j: int, slot: int, scene: Scene) -> None:
     """Note a margin from boat j if it is the least."""
-    if margin_m < scene.threat_m[slot]:
-        scene.threat_m[slot], scene.threat_by[slot] = margin_m, j
+    if margin_m < scene.pursuit_margin_m[slot]:
+        scene.pursuit_margin_m[slot], scene.pursuer[slot] = margin_m, j
 
 
 @lean_kernel
-def _clear_of_threat(i: int, j: int, slot: int, level_m: float, least_m: float, scene: Scene) -> bool:
+def _clear_of_opponent(i: int, j: int, slot: int, level_m: float, least_m: float, scene: Scene) -> bool:
     """Note the worst that opponent j may do; return False if it is below its floor, given by target, level and least.
 
     For a boat with several pursuers, j is also rolled out for a while and looked up from there. On a manoeuvre on which
     thrust never becomes full, such a boat counts as lost.
     """
-    target_m = scene.threat_target_m[i, j]
+    target_m = scene.pursuit_target_m[i, j]
     floor_m, by_table = max(least_m, min(target_m, level_m)), table_answers(i, j, slot, scene)
     if by_table:
         margin_m = worst_at_once(i, j, slot, scene)
@@ -326,12 +326,12 @@ def _clear_of_threat(i: int, j: int, slot: int, level_m: float, least_m: float, 
         scene.refused_by_table[slot] = scene.refused_by_table[slot] or margin_m < target_m
     else:
         margin_m = clear_of_pursuer(i, j, slot, floor_m, scene)
-    scene.threats_m[slot, j] = margin_m
+    scene.pursuit_margins_m[slot, j] = margin_m
     _note(margin_m, j, slot, scene)
     if not margin_m >= floor_m or not by_table or not scene.several_pursuers[i]:
         return margin_m >= floor_m
     floor_m, margin_m = max(least_m, min(scene.joint_target_m[i], level_m)), -scene.radius[i, j]
-    if scene.ready[slot, READY_SAMPLE] >= 0.0:
+    if scene.full_thrust[slot, FULL_THRUST_SAMPLE] >= 0.0:
         margin_m = clear_of_pursuer(i, j, slot, floor_m, scene)
     scene.joint_m[slot] = min(scene.joint_m[slot], margin_m)
     _note(margin_m, j, slot, scene)
@@ -343,14 +343,14 @@ def _falls_short(i: int, slot: int, scene: Scene) -> bool:
     """Return whether a margin against pursuers on the path in ``slot`` is below the required one."""
     short = scene.several_pursuers[i] and not scene.joint_m[slot] >= scene.joint_target_m[i]
     for j in range(scene.ours.shape[0]):
-        short = short or not scene.threats_m[slot, j] >= scene.threat_target_m[i, j]
+        short = short or not scene.pursuit_margins_m[slot, j] >= scene.pursuit_target_m[i, j]
     return short
 
 
 @lean_kernel
 def _may_harm(i: int, j: int, scene: Scene) -> bool:
     """Return whether boat j is an opponent that counts as a pursuer of boat i."""
-    team, near = scene.boats.team, j != i and scene.near[i, j] and not scene.inside_separation[i, j]
+    team, near = scene.boats.team, j != i and scene.neighbours[i, j] and not scene.inside_separation[i, j]
     return near and not scene.ours[j] and team[i] != team[j] and may_pursue(j, scene)
 
 
@@ -359,7 +359,7 @@ def falls_short_at_once(i: int, slot: int, level_m: float, least_m: float, scene
     """Return whether `worst_pursuer` would stop by what tables report of the place in ``slot``, whatever the path."""
     for j in range(scene.ours.shape[0]):
         if _may_harm(i, j, scene) and table_answers(i, j, slot, scene):
-            floor_m = max(least_m, min(scene.threat_target_m[i, j], level_m))
+            floor_m = max(least_m, min(scene.pursuit_target_m[i, j], level_m))
             if worst_at_once(i, j, slot, scene) < floor_m:
                 return True
     return False
@@ -367,7 +367,7 @@ def falls_short_at_once(i: int, slot: int, level_m: float, least_m: float, scene
 
 @lean_kernel
 def worst_pursuer(i: int, slot: int, level_m: float, least_m: float, scene: Scene) -> None:
-    """Find the margin from each pursuer (``scene.threats_m[slot]``); lower that in ``slot`` where it is worse.
+    """Find the margin from each pursuer (``scene.pursuit_margins_m[slot]``); lower that in ``slot`` where it is worse.
 
     A path whose pursuers are fully known is not checked again: they depend on no teammate's manoeuvre, nor on the
     targets.
@@ -377,22 +377,23 @@ def worst_pursuer(i: int, slot: int, level_m: float, least_m: float, scene: Scen
     that fail cost little.
 
     ``scene.refused_by_table[slot]``: the margin is violated by what a table reports of the first place where the boat
-    is looked up, and by nothing worse. One step ahead (done = 1) that place is the same for all manoeuvres: none does
+    is looked up, and by nothing worse. One step ahead (ahead = 1) that place is the same for all manoeuvres: none does
     better.
     """
     if not scene.pursuers_known[slot]:
-        scene.pursuers_known[slot], scene.refused_by_table[slot], scene.threat_by[slot] = True, False, -1
-        scene.threats_m[slot, :], scene.joint_m[slot] = FAR, FAR
-        scene.table_m[slot], scene.threat_m[slot] = FAR, FAR
+        scene.pursuers_known[slot], scene.refused_by_table[slot], scene.pursuer[slot] = True, False, -1
+        scene.pursuit_margins_m[slot, :], scene.joint_m[slot] = FAR, FAR
+        scene.table_m[slot], scene.pursuit_margin_m[slot] = FAR, FAR
         first = scene.first_pursuer[i]
         for number in range(scene.ours.shape[0]):
             j = _first_then_rest(first, number)
             if not _may_harm(i, j, scene):
                 continue
-            if not _clear_of_threat(i, j, slot, level_m, least_m, scene):
+            if not _clear_of_opponent(i, j, slot, level_m, least_m, scene):
                 scene.first_pursuer[i], scene.pursuers_known[slot] = j, False
                 break
-        scene.refused_by_table[slot] = scene.refused_by_table[slot] and scene.threat_m[slot] >= scene.table_m[slot]
+        if not scene.pursuit_margin_m[slot] >= scene.table_m[slot]:
+            scene.refused_by_table[slot] = False
     scene.violates_pursuers[slot] = _falls_short(i, slot, scene)
-    if scene.threat_m[slot] < scene.clear[slot, MARGIN]:
-        scene.clear[slot, MARGIN], scene.bound[slot] = scene.threat_m[slot], scene.threat_by[slot]
+    if scene.pursuit_margin_m[slot] < scene.clear[slot, MARGIN]:
+        scene.clear[slot, MARGIN], scene.active[slot] = scene.pursuit_margin_m[slot], scene.pursuer[slot]

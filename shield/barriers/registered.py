@@ -42,7 +42,7 @@ def margin_of(b: int, x: float, y: float, ahead_s: float, registered: Registered
     if math.isnan(h):
         registered.faults[b] += 1
         return LOST_M
-    return max(DEEPEST_M, min(FAR, h - registered.off_m))
+    return max(DEEPEST_M, min(FAR, h - registered.uncertainty_m))
 
 
 @lean_kernel
@@ -76,15 +76,15 @@ class RegisteredBarriers:
 
     Args:
         names: their names.
-        off_m: how far off a boat may be, and how much a margin may fall short between two samples of a path, m.
+        uncertainty_m: how far off a boat may be, and how much a margin may fall short between two samples of a path, m.
         late_s: time until the commands take effect, s.
 
     Raises:
         ConfigError: a name is not registered in this process, or the compiler rejects its function.
     """
 
-    def __init__(self, names: tuple[str, ...], off_m: float, late_s: float) -> None:
-        self.names, self.arrays = names, new_registered(len(names), off_m, late_s)
+    def __init__(self, names: tuple[str, ...], uncertainty_m: float, late_s: float) -> None:
+        self.names, self.arrays = names, new_registered(len(names), uncertainty_m, late_s)
         for name in names:
             address_of(get_barrier(name))  # compiled now, not in the first decision
 

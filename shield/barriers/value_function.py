@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from ..backup.paths import READY_HEADING, READY_SAMPLE, READY_SPEED, sail
+from ..backup.paths import FULL_THRUST_HEADING, FULL_THRUST_SAMPLE, FULL_THRUST_SPEED, sail
 from ..jit import Array, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..platforms.actuator import actuate
@@ -38,22 +38,22 @@ MARGIN_THERE = PLACE_USABLE
 
 
 @lean_kernel
-def _note_place(row: Array, ready_thrust: float, place: Array) -> None:
+def _note_place(row: Array, full_thrust_percent: float, place: Array) -> None:
     """Write the place of a state row; a table reports nothing of a boat that is not at full thrust."""
     place[PLACE_X], place[PLACE_Y] = row[L.X], row[L.Y]
     place[PLACE_HEADING], place[PLACE_SPEED] = math.radians(row[L.HEADING]), row[L.SPEED]
-    place[PLACE_USABLE] = 1.0 if row[L.THRUST] >= ready_thrust else 0.0
+    place[PLACE_USABLE] = 1.0 if row[L.THRUST] >= full_thrust_percent else 0.0
 
 
 @lean_kernel
 def run_opponents(steps: int, scene: Scene) -> None:
-    """Write where opponents with tables may be after some model steps, at least one decision: ``scene.ways``.
+    """Write ``scene.opponent_places``: where those with tables may be after some model steps, at least one decision.
 
     Known margins from opponents become invalid.
     """
     state, ours, boats, tuning = scene.state, scene.ours, scene.boats, scene.tuning
     scene.pursuers_known[:] = False
-    scene.lookup[:, :, PLACE_X] = np.nan
+    scene.table_cache[:, :, PLACE_X] = np.nan
     for j in range(state.shape[0]):
         if ours[j] or scene.predicted[j] or not boats.has_table[j]:
             continue
@@ -65,7 +65,7 @@ def run_opponents(steps: int, scene: Scene) -> None:
             speed = state[j, L.SPEED] if way == 0 else params[L.MAX_SPEED]
             for _ in range(max(steps, tuning.moves)):
                 actuate(params, scene.row, speed, turn, tuning.model_s)
-            _note_place(scene.row, boats.ready_thrust[j], scene.ways[j, way])
+            _note_place(scene.row, boats.full_thrust_percent[j], scene.opponent_places[j, way])
 
 
 @lean_kernel
@@ -81,13 +81,13 @@ def find_several_pursuers(scene: Scene) -> None:
         scene.several_pursuers[i] = False
         if not ours[i] or boats.table_steps[i] == 0:
             continue
-        _note_place(state[i], boats.ready_thrust[i], scene.look[i])
+        _note_place(state[i], boats.full_thrust_percent[i], scene.table_place[i])
         count = 0
         for j in range(n):
-            if j == i or ours[j] or not scene.near[i, j] or not tabled(i, j, scene):
+            if j == i or ours[j] or not scene.neighbours[i, j] or not tabled(i, j, scene):
                 continue
             table_m = boats.tables.axes[boats.table[i, j], CAP] - scene.radius[i, j] - boats.table_margin_m - 1e-9
-            if table_margin(i, j, scene.look[i], scene.ways[j], table_m, scene) < FAR:
+            if table_margin(i, j, scene.table_place[i], scene.opponent_places[j], table_m, scene) < FAR:
                 count += 1
                 if count > 1:
                     scene.several_pursuers[i] = True
@@ -95,19 +95,19 @@ def find_several_pursuers(scene: Scene) -> None:
 
 
 @lean_kernel
-def set_place(i: int, slot: int, side: float, togo_deg: float, speed_mps: float, done: int, scene: Scene) -> None:
+def set_place(i: int, slot: int, rudder: float, togo_deg: float, speed_mps: float, ahead: int, scene: Scene) -> None:
     """Write where boat i is looked up for the manoeuvre in ``slot``.
 
-    For done = 1 that is its predicted state, the same for every manoeuvre. For done = 0 it is ``boats.table_steps``
+    For ahead = 1 that is its predicted state, the same for every manoeuvre. For ahead = 0 it is ``boats.table_steps``
     steps into the manoeuvre, because within one step manoeuvres hardly differ.
     """
     state, boats, tuning = scene.state, scene.boats, scene.tuning
     if boats.table_steps[i] == 0:
         return
-    copy_row(scene.row, scene.next_state[i] if done == 1 else state[i])
-    for _ in range(0 if done == 1 else boats.table_steps[i]):
-        togo_deg = sail(boats.params[i], scene.row, side, togo_deg, speed_mps, tuning.model_s)
-    _note_place(scene.row, boats.ready_thrust[i], scene.look[slot])
+    copy_row(scene.row, scene.next_state[i] if ahead == 1 else state[i])
+    for _ in range(0 if ahead == 1 else boats.table_steps[i]):
+        togo_deg = sail(boats.params[i], scene.row, rudder, togo_deg, speed_mps, tuning.model_s)
+    _note_place(scene.row, boats.full_thrust_percent[i], scene.table_place[slot])
 
 
 @lean_kernel
@@ -123,31 +123,31 @@ def tabled(i: int, j: int, scene: Scene) -> bool:
 @lean_kernel
 def table_answers(i: int, j: int, slot: int, scene: Scene) -> bool:
     """Return whether the table answers for boat i at the place in ``slot`` and opponent j."""
-    return scene.look[slot, PLACE_USABLE] != 0.0 and tabled(i, j, scene)
+    return scene.table_place[slot, PLACE_USABLE] != 0.0 and tabled(i, j, scene)
 
 
 @lean_kernel
 def beyond_table(i: int, j: int, slot: int, scene: Scene) -> bool:
     """Return whether opponent j is too far for its table to report anything, and for coming near before."""
-    boats, path, ready, course = scene.boats, scene.path[slot], scene.ready[slot], scene.course[j]
+    boats, path, full_thrust, course = scene.boats, scene.path[slot], scene.full_thrust[slot], scene.course[j]
     own_mps = max(boats.fastest_mps[i], scene.state[i, L.SPEED])
     other_mps = max(boats.params[j, L.MAX_SPEED], scene.state[j, L.SPEED])
-    horizon_s = adversarial_for(i, j, ready[READY_SPEED], scene)
+    horizon_s = adversarial_for(i, j, full_thrust[FULL_THRUST_SPEED], scene)
     kept_m = max(
         full_from_m(boats.tables, boats.table[i, j], horizon_s), scene.radius[i, j] + scene.tuning.margin_cap_m
     )
     gap_m = math.hypot(path[0, 0] - course[0], path[0, 1] - course[1])
-    return gap_m >= kept_m + ROOM_M + (own_mps + other_mps) * boats.sample_s * ready[READY_SAMPLE]
+    return gap_m >= kept_m + ROOM_M + (own_mps + other_mps) * boats.sample_s * full_thrust[FULL_THRUST_SAMPLE]
 
 
 @lean_kernel
-def margin_when_ready(i: int, j: int, slot: int, run: Array, scene: Scene) -> float:
+def margin_at_full_thrust(i: int, j: int, slot: int, run: Array, scene: Scene) -> float:
     """Return the margin, m, of boat i by table at the end of a rollout of opponent j."""
-    boats, path, ready = scene.boats, scene.path[slot], scene.ready[slot]
-    table, k = boats.table[i, j], int(ready[READY_SAMPLE])
-    horizon_s = adversarial_for(i, j, ready[READY_SPEED], scene)
+    boats, path, full_thrust = scene.boats, scene.path[slot], scene.full_thrust[slot]
+    table, k = boats.table[i, j], int(full_thrust[FULL_THRUST_SAMPLE])
+    horizon_s = adversarial_for(i, j, full_thrust[FULL_THRUST_SPEED], scene)
     dx, dy, heading = run[RUN_X] - path[k, 0], run[RUN_Y] - path[k, 1], math.atan2(run[RUN_EAST], run[RUN_NORTH])
-    own_heading, own_mps = ready[READY_HEADING], ready[READY_SPEED]
+    own_heading, own_mps = full_thrust[FULL_THRUST_HEADING], full_thrust[FULL_THRUST_SPEED]
     value = table_value(boats.tables, table, horizon_s, dx, dy, own_heading, heading, own_mps, run[RUN_SPEED])
     return _margin_of(i, j, value, scene)
 
@@ -185,13 +185,13 @@ def table_margin(i: int, j: int, own: Array, others: Array, enough_m: float, sce
 @lean_kernel
 def margin_at_once(i: int, j: int, slot: int, enough_m: float, scene: Scene) -> float:
     """Return the margin, m, of boat i from opponent j at the first lookup in ``slot``, see `table_margin`."""
-    return table_margin(i, j, scene.look[slot], scene.ways[j], enough_m, scene)
+    return table_margin(i, j, scene.table_place[slot], scene.opponent_places[j], enough_m, scene)
 
 
 @lean_kernel
 def worst_at_once(i: int, j: int, slot: int, scene: Scene) -> float:
     """Return `margin_at_once`, cached: one step ahead it is the same for every manoeuvre."""
-    place, known = scene.look[slot], scene.lookup[i, j]
+    place, known = scene.table_place[slot], scene.table_cache[i, j]
     same = place[PLACE_X] == known[PLACE_X] and place[PLACE_Y] == known[PLACE_Y]
     if same and place[PLACE_HEADING] == known[PLACE_HEADING] and place[PLACE_SPEED] == known[PLACE_SPEED]:
         return known[MARGIN_THERE]

@@ -21,7 +21,17 @@ import numpy as np
 from ..backup.assign import assign_manoeuvres
 from ..backup.family import IN_MEMORY, candidate, remembered
 from ..backup.rollout import roll_out
-from ..backup.score import ALL, BOATS, OBSTACLES, OPPONENTS, WORST, Score, better, score_of, score_path
+from ..backup.score import (
+    CLEAR_OF_ALL,
+    CLEAR_OF_BOATS,
+    CLEAR_OF_KNOWN,
+    CLEAR_OF_OBSTACLES,
+    WORST,
+    Score,
+    better,
+    score_of,
+    score_path,
+)
 from ..barriers.boats import reported_margin
 from ..barriers.clearance import MARGIN
 from ..barriers.static import clear_of_near_obstacles
@@ -39,9 +49,9 @@ def pick_movers(scene: Scene) -> int:
     ours = scene.ours
     n = ours.shape[0]
     for i in range(n):
-        if ours[i] and scene.satisfied[i] < ALL:
+        if ours[i] and scene.satisfied[i] < CLEAR_OF_ALL:
             scene.moving[i] = True
-            j = scene.bound[i]
+            j = scene.active[i]
             if j >= 0 and ours[j]:
                 scene.moving[j] = True
     return list_movers(scene)
@@ -63,32 +73,32 @@ def list_movers(scene: Scene) -> int:
 def slack_of(i: int, scene: Scene) -> float:
     """Return by how much boat i violates its distance from boats and static constraints, m."""
     least = reported_margin(i, scene)
-    if scene.satisfied[i] >= OPPONENTS:
+    if scene.satisfied[i] >= CLEAR_OF_BOATS:
         least = min(least, scene.static_clear[i, MARGIN])
-    if scene.satisfied[i] == BOATS:  # of an obstacle near in time nothing else is noted
+    if scene.satisfied[i] == CLEAR_OF_KNOWN:  # of an obstacle near in time nothing else is noted
         clear_of_near_obstacles(i, i, scene, 0.0, scene.scratch_clear)
         least = min(least, scene.scratch_clear[MARGIN])
     return max(0.0, -least)
 
 
 @lean_kernel
-def first_command(i: int, row: Array, side: float, togo_deg: float, speed_mps: float, scene: Scene) -> float:
+def first_command(i: int, row: Array, rudder: float, togo_deg: float, speed_mps: float, scene: Scene) -> float:
     """Return the heading error, deg, that begins a manoeuvre of boat i from a state: its autopilot's inverse."""
     params, dt_s = scene.boats.params[i], scene.tuning.dt_s
     if togo_deg > 0.0:
-        togo_deg = min(togo_deg, abs(side) * full_turn(params, row, speed_mps, dt_s))
-    return command_for_turn(params, row, speed_mps, math.copysign(togo_deg, side), dt_s)
+        togo_deg = min(togo_deg, abs(rudder) * full_turn(params, row, speed_mps, dt_s))
+    return command_for_turn(params, row, speed_mps, math.copysign(togo_deg, rudder), dt_s)
 
 
 @lean_kernel
 def command_backup(i: int, scene: Scene) -> None:
     """Command the first step of boat i's backup."""
     state, held, manoeuvre = scene.state[i], scene.held[i], scene.manoeuvre[i]
-    side, togo, speed = manoeuvre[0], manoeuvre[1], manoeuvre[2]
-    held[0], held[1], held[2] = side, np.nan, speed
+    rudder, togo, speed = manoeuvre[0], manoeuvre[1], manoeuvre[2]
+    held[0], held[1], held[2] = rudder, np.nan, speed
     if togo > 0.0:
-        held[1] = state[L.HEADING] + math.copysign(togo, side)
-    scene.command[i, 0], scene.command[i, 1] = speed, first_command(i, state, side, togo, speed, scene)
+        held[1] = state[L.HEADING] + math.copysign(togo, rudder)
+    scene.command[i, 0], scene.command[i, 1] = speed, first_command(i, state, rudder, togo, speed, scene)
 
 
 @lean_kernel
@@ -97,11 +107,11 @@ def _score_without_passed(i: int, slot: int, scene: Scene) -> Score:
     ours = scene.ours
     for j in range(ours.shape[0]):
         if ours[j] and not scene.moving[j]:
-            scene.near[i, j] = False
+            scene.neighbours[i, j] = False
     score = score_path(i, slot, WORST, scene)
     for j in range(ours.shape[0]):
         if ours[j] and not scene.moving[j]:
-            scene.near[i, j] = scene.near[j, i]
+            scene.neighbours[i, j] = scene.neighbours[j, i]
     return score
 
 
@@ -115,15 +125,15 @@ def _passed_block(count: int, scene: Scene) -> bool:
     trial = state.shape[0]
     for m in range(count):
         i = scene.movers[m]
-        if scene.satisfied[i] == ALL:
+        if scene.satisfied[i] == CLEAR_OF_ALL:
             continue
         if better(_score_without_passed(i, i, scene), score_of(i, scene)):
             return True
         heading = state[i, L.HEADING]
         if not remembered(i, 0, heading, scene):
             continue
-        side, togo, speed = candidate(i, IN_MEMORY, 0.0, heading, scene)
-        roll_out(i, trial, side, togo, speed, 0, scene)
+        rudder, togo, speed = candidate(i, IN_MEMORY, 0.0, heading, scene)
+        roll_out(i, trial, rudder, togo, speed, 0, scene)
         if better(_score_without_passed(i, trial, scene), score_of(i, scene)):
             return True
     return False
@@ -135,7 +145,7 @@ def _join(scene: Scene) -> int:
     ours = scene.ours
     for i in range(ours.shape[0]):
         for m in range(ours.shape[0]):
-            if ours[i] and scene.mover_of[m] >= 0 and scene.near[i, m]:
+            if ours[i] and scene.mover_of[m] >= 0 and scene.neighbours[i, m]:
                 scene.moving[i] = True
     return list_movers(scene)
 
@@ -145,7 +155,7 @@ def _join_short(scene: Scene) -> int:
     """Make movers of own boats that passed and that the movers' backups come too near; return the number of movers."""
     ours = scene.ours
     for i in range(ours.shape[0]):
-        if ours[i] and scene.satisfied[i] < OBSTACLES:
+        if ours[i] and scene.satisfied[i] < CLEAR_OF_OBSTACLES:
             scene.moving[i] = True
     return list_movers(scene)
 
@@ -163,7 +173,7 @@ def _assign_backups(count: int, scene: Scene) -> bool:
         scene.teammate_target_m[i] = 0.0
     for m in range(count):
         i = scene.movers[m]
-        scene.threat_target_m[i, :] = 0.0
+        scene.pursuit_target_m[i, :] = 0.0
         scene.joint_target_m[i] = 0.0
         scene.static_target_m[i] = 0.0
         table_steps = max(table_steps, boats.table_steps[i])
@@ -204,7 +214,7 @@ def back_up(scene: Scene) -> None:
     ours = scene.ours
     _find_backups(pick_movers(scene), scene)
     for i in range(ours.shape[0]):
-        keeps = scene.satisfied[i] >= OPPONENTS
+        keeps = scene.satisfied[i] >= CLEAR_OF_BOATS
         if ours[i] and scene.reason[i] != STOPPED and (scene.moving[i] or not keeps):
             scene.reason[i] = BACKUP if keeps else BEST_EFFORT
             scene.slack_m[i] = slack_of(i, scene)

@@ -8,7 +8,7 @@ have to give way for longer.
 from __future__ import annotations
 
 from ..backup.assign import score_all
-from ..backup.score import ALL, SAME_M
+from ..backup.score import CLEAR_OF_ALL, SAME_M
 from ..jit import copy_row, lean_kernel
 from ..platforms import layout as L
 from ..platforms.actuator import command_for_turn
@@ -50,7 +50,7 @@ def rescore_backups(static_rate: bool, scene: Scene) -> None:
 @lean_kernel
 def satisfies_all(i: int, scene: Scene) -> bool:
     """Return whether boat i's backup satisfies all constraints."""
-    return int(scene.verified[i, SATISFIED]) == ALL
+    return int(scene.verified[i, SATISFIED]) == CLEAR_OF_ALL
 
 
 @lean_kernel
@@ -74,7 +74,7 @@ def keeps_backup_scores(most_m: float, scene: Scene) -> bool:
     for i in range(ours.shape[0]):
         if ours[i]:
             had = int(verified[i, SATISFIED])
-            least_m = verified[i, SCORE] - SAME_M - (most_m if had == ALL else 0.0)
+            least_m = verified[i, SCORE] - SAME_M - (most_m if had == CLEAR_OF_ALL else 0.0)
             within = within and (
                 scene.satisfied[i] > had or (scene.satisfied[i] == had and scene.score_m[i] >= least_m)
             )

@@ -17,10 +17,9 @@ import numpy as np
 from ..backup.assign import refresh, score_all
 from ..backup.family import IN_MEMORY, candidate, remembered, turn_left
 from ..backup.rollout import roll_out
-from ..backup.score import OPPONENTS
+from ..backup.score import CLEAR_OF_BOATS
 from ..barriers.clearance import FAR
-from ..barriers.shapes import goes_through, to_circle, to_wall
-from ..barriers.static import STATIC, beyond_line
+from ..barriers.static import STATIC, beyond_line, goes_through, to_circle, to_wall
 from ..jit import Array, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..platforms.step import step_boat
@@ -86,7 +85,7 @@ def _stop_stays_clear(i: int, start: Array, x: float, y: float, least_m: float, 
 
 
 @lean_kernel
-def _stays_clear(i: int, start: Array, side: float, togo_deg: float, speed_mps: float, scene: Scene) -> bool:
+def _stays_clear(i: int, start: Array, rudder: float, togo_deg: float, speed_mps: float, scene: Scene) -> bool:
     """Return whether boat i stays clear from a state on if it stops at once, or at some time on a manoeuvre.
 
     At any time: where a manoeuvre stays clear only if it is left in time, what is left of it after a step does so, too.
@@ -97,11 +96,11 @@ def _stays_clear(i: int, start: Array, side: float, togo_deg: float, speed_mps: 
     least_m = min(0.0, _room(x, y, static)) - ROUNDING_M
     copy_row(row, start)
     if togo_deg > 0.0:
-        end_deg = row[L.HEADING] + math.copysign(togo_deg, side)
+        end_deg = row[L.HEADING] + math.copysign(togo_deg, rudder)
     for _ in range(scene.boats.samples[i] * scene.boats.stride // tuning.moves + 1):
         if _stop_stays_clear(i, row, x, y, least_m, scene):
             return True
-        error_deg = first_command(i, row, side, turn_left(row[L.HEADING], end_deg, side), speed_mps, scene)
+        error_deg = first_command(i, row, rudder, turn_left(row[L.HEADING], end_deg, rudder), speed_mps, scene)
         for _ in range(tuning.moves):
             if _room(row[L.X], row[L.Y], static) < least_m or _through(x, y, row, static):
                 return False
@@ -117,7 +116,7 @@ def _stop(i: int, scene: Scene) -> None:
     predict(i, scene.command, scene)
     roll_out(i, i, 1.0, 0.0, 0.0, 1, scene)
     refresh(i, scene)
-    scene.reason[i], scene.bound[i] = STOPPED, STATIC
+    scene.reason[i], scene.active[i] = STOPPED, STATIC
 
 
 @lean_kernel
@@ -129,21 +128,21 @@ def _last_stays_clear(i: int, scene: Scene) -> bool:
     stops = _stop_stays_clear(i, state[i], x, y, least_m, scene)
     if stops or not remembered(i, 0, state[i, L.HEADING], scene):
         return False
-    side, togo, speed = candidate(i, IN_MEMORY, 0.0, state[i, L.HEADING], scene)
-    return _stays_clear(i, state[i], side, togo, speed, scene)
+    rudder, togo, speed = candidate(i, IN_MEMORY, 0.0, state[i, L.HEADING], scene)
+    return _stays_clear(i, state[i], rudder, togo, speed, scene)
 
 
 @lean_kernel
 def _go_on_as_before(i: int, scene: Scene) -> None:
     """Command the remembered manoeuvre of boat i."""
-    side, togo, speed = candidate(i, IN_MEMORY, 0.0, scene.state[i, L.HEADING], scene)
-    roll_out(i, i, side, togo, speed, 0, scene)
+    rudder, togo, speed = candidate(i, IN_MEMORY, 0.0, scene.state[i, L.HEADING], scene)
+    roll_out(i, i, rudder, togo, speed, 0, scene)
     command_backup(i, scene)
     predict(i, scene.command, scene)
-    side, togo, speed = candidate(i, IN_MEMORY, 0.0, scene.next_state[i, L.HEADING], scene)
-    roll_out(i, i, side, togo, speed, 1, scene)
+    rudder, togo, speed = candidate(i, IN_MEMORY, 0.0, scene.next_state[i, L.HEADING], scene)
+    roll_out(i, i, rudder, togo, speed, 1, scene)
     refresh(i, scene)
-    scene.reason[i], scene.bound[i] = BEST_EFFORT, STATIC
+    scene.reason[i], scene.active[i] = BEST_EFFORT, STATIC
 
 
 @lean_kernel
@@ -154,8 +153,8 @@ def _last_resort(i: int, scene: Scene) -> int:
         return MUST_STOP
     if static.last_circles + static.last_segments == 0:
         return NO_LAST_RESORT
-    side, togo, speed = scene.manoeuvre[i, 0], scene.manoeuvre[i, 1], scene.manoeuvre[i, 2]
-    if _stays_clear(i, scene.next_state[i], side, togo, speed, scene):
+    rudder, togo, speed = scene.manoeuvre[i, 0], scene.manoeuvre[i, 1], scene.manoeuvre[i, 2]
+    if _stays_clear(i, scene.next_state[i], rudder, togo, speed, scene):
         return NO_LAST_RESORT
     return GO_ON if _last_stays_clear(i, scene) else MUST_STOP
 
@@ -188,5 +187,5 @@ def keep_last_line(scene: Scene) -> None:
         return
     score_all(scene)
     for i in range(scene.ours.shape[0]):
-        if scene.ours[i] and scene.satisfied[i] < OPPONENTS and scene.reason[i] not in (STOPPED, HELD):
+        if scene.ours[i] and scene.satisfied[i] < CLEAR_OF_BOATS and scene.reason[i] not in (STOPPED, HELD):
             scene.reason[i], scene.slack_m[i] = BEST_EFFORT, slack_of(i, scene)

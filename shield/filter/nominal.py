@@ -1,12 +1,17 @@
 """The nominal check: may the nominal commands be sent as they are? And the exact check of any candidate command.
 
 Both predict one step with the full model, then score the backup that each boat has from there.
+
+What does not pass is decided group by group. Two boats are in one group if they could meet, or could both meet boats of
+that group (`barriers.neighbours`). A group's decision does not depend on other groups: a teammate far away changes
+nothing, and many boats make many small problems.
 """
 
 from __future__ import annotations
 
 from .. import workspace as W
 from ..backup.assign import assign_manoeuvres, recheck
+from ..backup.score import CLEAR_OF_ALL
 from ..barriers.clearance import FAR
 from ..barriers.neighbours import find_neighbours
 from ..barriers.registered import unknown_at
@@ -70,7 +75,7 @@ def set_required_margins(scene: Scene) -> None:
             continue
         scene.target[i] = 0.0
         scene.teammate_target_m[i] = 0.0
-        scene.threat_target_m[i, :] = 0.0
+        scene.pursuit_target_m[i, :] = 0.0
         scene.joint_target_m[i] = 0.0
         scene.static_target_m[i] = 0.0
         if memory[i, W.HAS_BACKUP] > 0.0:
@@ -84,7 +89,7 @@ def set_required_margins(scene: Scene) -> None:
             for j in range(ours.shape[0]):
                 most_m = min(cap_m, _largest_tabled_m(i, j, scene))
                 kept_m = _required_m(decay, memory[i, W.N_MEMORY + j], most_m)
-                scene.threat_target_m[i, j] = most_m if memory[i, W.HOLD_S] > 0.0 else kept_m
+                scene.pursuit_target_m[i, j] = most_m if memory[i, W.HOLD_S] > 0.0 else kept_m
 
 
 @lean_kernel
@@ -121,3 +126,56 @@ def check_nominal(scene: Scene) -> None:
         copy_row(scene.checked[i], scene.command[i])
         scene.checked_reason[i] = scene.reason[i]
     assign_manoeuvres(scene, 1, ours)
+
+
+NOT_OURS, NONE, NOT_YET = -1, -2, -3
+"""Group numbers of other boats; of groups whose nominal commands satisfy everything; of boats not yet checked."""
+
+
+@lean_kernel
+def _gather(first: int, group: int, scene: Scene) -> bool:
+    """Number boat ``first`` and its whole group; return whether any of them violates something."""
+    ours, groups, queue = scene.ours, scene.group, scene.movers
+    groups[first], queue[0] = group, first
+    done, found, short = 0, 1, False
+    while done < found:
+        i = queue[done]
+        done += 1
+        short = short or scene.satisfied[i] < CLEAR_OF_ALL
+        for j in range(ours.shape[0]):
+            if groups[j] == NOT_YET and scene.neighbours[i, j]:
+                groups[j], queue[found] = group, j
+                found += 1
+    if not short:
+        for k in range(found):
+            groups[queue[k]] = NONE
+    return short
+
+
+@lean_kernel
+def make_groups(scene: Scene) -> int:
+    """Number, in ``scene.group``, the groups in which a nominal command fails; return how many."""
+    ours, groups = scene.ours, scene.group
+    for i in range(ours.shape[0]):
+        groups[i] = NOT_YET if ours[i] else NOT_OURS
+    count = 0
+    for i in range(ours.shape[0]):
+        if groups[i] == NOT_YET and _gather(i, count, scene):
+            count += 1
+    return count
+
+
+@lean_kernel
+def open_group(group: int, scene: Scene) -> None:
+    """Decide only for the boats of one group, from now on."""
+    ours, groups = scene.ours, scene.group
+    for i in range(ours.shape[0]):
+        ours[i] = groups[i] == group
+        scene.moving[i] = False
+
+
+@lean_kernel
+def close_groups(scene: Scene) -> None:
+    """Decide for all own boats again."""
+    for i in range(scene.ours.shape[0]):
+        scene.ours[i] = scene.group[i] != NOT_OURS

@@ -168,7 +168,7 @@ def _rows_of_boats(r: int, m: int, count: int, scene: Scene) -> int:
     i = scene.movers[m]
     for j in range(scene.ours.shape[0]):
         other = scene.mover_of[j]
-        if j == i or not scene.near[i, j] or (other >= 0 and j < i):
+        if j == i or not scene.neighbours[i, j] or (other >= 0 and j < i):
             continue
         if r + 1 + 6 * count > scene.C.shape[0]:
             return -1

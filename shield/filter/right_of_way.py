@@ -57,7 +57,7 @@ def _alongside(i: int, turn_deg: float, speed_mps: float, scene: Scene) -> int:
         if (
             j == i
             or not ours[j]
-            or not scene.near[i, j]
+            or not scene.neighbours[i, j]
             or abs(wrap_degrees(state[j, L.HEADING] - state[i, L.HEADING])) > ALIKE_DEG
         ):
             continue
@@ -100,7 +100,7 @@ def _goes_on(i: int, turn_deg: float, speed_mps: float, scene: Scene) -> bool:
     """Return whether boat i must still give way: until it is clear, or wants to turn the way it gives way to."""
     state, ours, memory = scene.state, scene.ours, scene.memory
     j = int(memory[i, W.BLOCKED_BY])
-    if j < 0 or not ours[j] or not scene.near[i, j] or memory[i, W.HAS_BACKUP] == 0.0:
+    if j < 0 or not ours[j] or not scene.neighbours[i, j] or memory[i, W.HAS_BACKUP] == 0.0:
         return False
     if speed_mps <= STILL_MPS or memory[i, W.DEADLOCK_S] >= LONGEST_S:
         return False
@@ -157,10 +157,10 @@ def note_deadlock(i: int, scene: Scene) -> None:
     """Note since when, and on what heading, boat i is kept from turning: its turn towards a teammate was changed."""
     state, tuning, memory = scene.state, scene.tuning, scene.memory
     if scene.reason[i] == W.RIGHT_OF_WAY:
-        scene.bound[i], memory[i, W.FREE_S] = int(memory[i, W.BLOCKED_BY]), 0.0
+        scene.active[i], memory[i, W.FREE_S] = int(memory[i, W.BLOCKED_BY]), 0.0
         return
     memory[i, W.FREE_S] += tuning.dt_s
-    j = scene.bound[i]
+    j = scene.active[i]
     if scene.reason[i] < W.LEAST_CHANGE or scene.reason[i] > W.BEST_EFFORT or j < 0 or unchanged(i, scene):
         return
     turn_deg, speed_mps = wrap_degrees(scene.checked[i, 1]), scene.checked[i, 0]

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..config import ShieldConfig, Unsaid
+from ..config import DefaultDistance, ShieldConfig
 from ..exceptions import ConfigError
 from ..jit import Array, IntArray
 from ..platforms import Platform, get_platform
@@ -77,8 +77,8 @@ def fitting(config: ShieldConfig, facts: GameFacts, team: int, held: bool = Fals
     config = _for_held_commands(config, facts) if held and facts.moves > 1 else _for_moves(config, facts)
     larger: dict[str, Any] = {}
     for name, metres in facts.distances(team).items():
-        if not config.said(name) and metres > getattr(config, name):
-            larger[name] = Unsaid(metres)
+        if not config.is_chosen(name) and metres > getattr(config, name):
+            larger[name] = DefaultDistance(metres)
             _warn_once(
                 f"no {name} was given: the shield keeps {metres:g} m, the distance at which this game {_WHY[name]}"
             )

@@ -257,10 +257,10 @@ def test_whatever_goes_in_finite_commands_come_out(data, form, harbour):
     top_mps = np.array([get_platform(kind).max_speed_mps for kind in fleet.platforms])
     for _ in range(2):
         decisions = shield.decide(fleet, make(data.draw(any_commands(len(fleet)))))
-        changed, wanted_mps = decisions.intervened, decisions.nominal.values[:, 0]
+        changed, commanded_mps = decisions.intervened, decisions.nominal.values[:, 0]
         sent_mps, sent_deg = decisions.filtered.as_relative_deg(fleet.state[:, L.HEADING]).T
         within = (sent_mps >= -ROUNDING_MPS) & (sent_mps <= top_mps + ROUNDING_MPS)  # as nominal commands pass
-        assert (within | (sent_mps == wanted_mps))[changed].all()
+        assert (within | (sent_mps == commanded_mps))[changed].all()
         assert (np.abs(sent_deg) <= 180.0)[changed].all()
         own = fleet.controlled
         assert np.isfinite(decisions.filtered.values[own]).all()

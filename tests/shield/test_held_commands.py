@@ -86,7 +86,7 @@ def test_the_place_foreseen_is_where_the_game_puts_the_boat(steps, platform):
         assert np.hypot(*(foreseen[:, :2] - now).T)[ours].max(initial=0.0) < SAME_M
         after, stride = [*places[1:], now], work.boats.stride
         upper = np.array([places[0][:, 1] > 40.0, now[:, 1] > 40.0])  # the nearer corner is driven to: it may change
-        near = work.near[ours].any(axis=0)  # others matter to nobody, and are not predicted
+        near = work.neighbours[ours].any(axis=0)  # others matter to nobody, and are not predicted
         for j in np.flatnonzero(known & near & (upper[0] == upper[1])):
             driven += 1
             for k in range((steps - 1) // stride + 1):

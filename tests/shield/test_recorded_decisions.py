@@ -48,7 +48,7 @@ CASES = {
         },
     ),
 }
-TOLD = ("reason", "safety_margin_m", "slack_m", "bound", "cut_short", "outside_m")
+TOLD = ("reason", "safety_margin_m", "slack_m", "active_constraint", "cut_short", "outside_m")
 
 
 def begun(name):

@@ -127,7 +127,7 @@ COLUMNS: dict[str, tuple[type, str, type, tuple[int, ...]]] = {
     "reason": (Decisions, "reason", np.int64, ()),
     "certificate_m": (Decisions, "safety_margin_m", np.float64, ()),  # the name that logs have had since 0.2.0
     "slack_m": (Decisions, "slack_m", np.float64, ()),
-    "bound": (Decisions, "bound", np.int64, ()),
+    "bound": (Decisions, "active_constraint", np.int64, ()),  # as above
     "cut_short": (Decisions, "cut_short", np.bool_, ()),
     "solver": (Decisions, "solver", np.int64, ()),
 }

@@ -145,7 +145,9 @@ def test_any_settings_and_inputs_come_back(tmp_path, kind, platform, settings):
     assert proof.same == proof.decisions == 120
 
 
-@pytest.mark.parametrize("name", ["safety_margin_m", "slack_m", "reason", "bound", "intervened", "sent heading"])
+@pytest.mark.parametrize(
+    "name", ["safety_margin_m", "slack_m", "reason", "active_constraint", "intervened", "sent heading"]
+)
 def test_a_value_that_differs_in_its_last_bit_is_found_and_named(ticks, name):
     if name == "sent heading":
         values = ticks[50].decisions.filtered.values.copy()

@@ -43,7 +43,7 @@ def test_unlike_teammates_are_compared_for_the_longer_of_their_horizons(seed):
     shield.decide(fleet, Commands.absolute_deg([[2.0, 180.0], [boats[1][3], heading]]))
     scene = shield._deciders.scene
     assert scene.boats.samples[0] > scene.boats.samples[1]
-    if scene.near[0, 1]:
+    if scene.neighbours[0, 1]:
         found, by_paths = margins(shield, 0, 1)
         assert found <= by_paths + 1e-3
 
@@ -75,7 +75,7 @@ def assert_verified(shield, decisions):
     for i, decision in enumerate(decisions):
         if decision.reason not in (Reason.BEST_EFFORT, Reason.STOPPED):
             for j in range(len(decisions)):
-                if j != i and shield._deciders.scene.near[i, j]:
+                if j != i and shield._deciders.scene.neighbours[i, j]:
                     assert margins(shield, i, j)[0] >= min(0.0, decision.safety_margin_m) - 1e-6
 
 

@@ -176,7 +176,7 @@ DOORWAY = Path(__file__).parents[2] / "data" / "doorway.json"
 
 COLUMNS = {
     "has_backup": W.HAS_BACKUP,
-    "side": W.BACKUP_SIDE,
+    "side": W.BACKUP_RUDDER,
     "target_deg": W.BACKUP_HEADING,
     "speed_mps": W.BACKUP_SPEED,
     "margin_m": W.BACKUP_MARGIN,

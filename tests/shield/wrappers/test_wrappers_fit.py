@@ -135,7 +135,7 @@ def test_what_was_chosen_is_known_of_copies_and_does_not_make_settings_differ():
     assert (unsaid.separation_m, str(unsaid.separation_m)) == (2.5, "2.5")
     copies = (copy.deepcopy, lambda thing: pickle.loads(pickle.dumps(thing)), lambda thing: replace(thing, dt_s=0.1))
     for same in copies:
-        assert (same(unsaid).said("separation_m"), same(said).said("separation_m")) == (False, True)
+        assert (same(unsaid).is_chosen("separation_m"), same(said).is_chosen("separation_m")) == (False, True)
 
 
 def test_a_shield_is_put_to_a_game_that_was_changed_by_the_next_reset():

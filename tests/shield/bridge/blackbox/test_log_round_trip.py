@@ -88,7 +88,7 @@ def decided(draw, fleet, wanted):
         reason=draw(arrays(n, of=st.integers(0, 6), dtype=np.int64)),
         safety_margin_m=draw(arrays(n, of=floats.filter(lambda margin_m: margin_m != 1e6))),
         slack_m=draw(arrays(n)),
-        bound=draw(arrays(n, of=st.integers(-2, n - 1), dtype=np.int64)),
+        active_constraint=draw(arrays(n, of=st.integers(-2, n - 1), dtype=np.int64)),
         solve_time_s=draw(floats),
     )
 
