@@ -23,6 +23,7 @@ from steerclear.env.record_file import (
 )
 from steerclear.shield.exceptions import TraceError
 from steerclear.shield.platforms.layout import HEADING, SPEED, X, Y
+from steerclear.shield.renamed import old_names
 
 __all__ = [
     "ARRAYS",
@@ -32,7 +33,7 @@ __all__ = [
     "GameRecorder",
     "Record",
     "absolute_commands",
-    "find_breaches",
+    "find_violations",
     "load",
     "make_record",
     "meta_of",
@@ -98,7 +99,7 @@ def absolute_commands(commands: np.ndarray, heading_deg: np.ndarray) -> np.ndarr
     return absolute
 
 
-def find_breaches(position: np.ndarray, separation_m: float) -> np.ndarray:
+def find_violations(position: np.ndarray, separation_m: float) -> np.ndarray:
     """List every entry of two boats into the separation radius.
 
     The start position itself is not counted; a pair that starts inside counts at the first step.
@@ -132,7 +133,7 @@ class GameRecorder:
 
     Example:
         ``recorder.start(env.view(), meta)``, after each step ``recorder.step(env.view(), nominal, filtered)``,
-        at the end ``save(recorder.finish(breaches), "game.npz")``.
+        at the end ``save(recorder.finish(violations), "game.npz")``.
     """
 
     def __init__(self) -> None:
@@ -147,7 +148,7 @@ class GameRecorder:
         """
         read_meta({"meta": np.array(json.dumps(dict(meta), default=plain))})
         self._meta = dict(meta)
-        self._rows = {name: [] for name in ARRAYS if name != "breaches"}
+        self._rows = {name: [] for name in ARRAYS if name != "violations"}
         self._append(_state_of(view))
 
     def step(
@@ -184,11 +185,11 @@ class GameRecorder:
         }
         self._append(given | _state_of(view))
 
-    def finish(self, breaches: Sequence[Sequence[float]] | np.ndarray = ()) -> Record:
+    def finish(self, violations: Sequence[Sequence[float]] | np.ndarray = ()) -> Record:
         """Close the game and return the validated record.
 
         Args:
-            breaches: (K, 4) separation violations as from ``find_breaches``: first step, boat a, boat b, closest
+            violations: (K, 4) separation violations as from ``find_violations``: first step, boat a, boat b, closest
                 distance m.
 
         Raises:
@@ -197,7 +198,7 @@ class GameRecorder:
         if self._meta is None:
             raise TraceError("no game is being recorded. Call start() before finish().")
         arrays = {name: np.array(rows).reshape(-1, *self._row_shape(name)) for name, rows in self._rows.items()}
-        return make_record(self._meta, breaches=np.array(breaches, dtype=np.float64).reshape(-1, 4), **arrays)
+        return make_record(self._meta, violations=np.array(violations, dtype=np.float64).reshape(-1, 4), **arrays)
 
     def _append(self, given: Mapping[str, Any]) -> None:
         """Add one row to each named array, or to none of them if one does not fit."""
@@ -219,3 +220,6 @@ def _state_of(view: Any) -> dict[str, Any]:
     moving = {"position": state[:, [X, Y]], "heading_deg": state[:, HEADING], "speed_mps": state[:, SPEED]}
     marks = ("has_flag", "is_tagged", "oob", "is_disabled", "flag_position", "captures")
     return moving | {name: getattr(view, name) for name in marks}
+
+
+__getattr__ = old_names(globals(), {"find_breaches": "find_violations"})

@@ -18,10 +18,10 @@ array                shape           contents
 ``reason``           (T, n)          shield reason code; ``NOT_COVERED`` where no shield decided
 ``intervened``       (T, n)          bool, the two commands differ
 ``safety_margin_m``  (T, n)          float32, NaN where there is none
-``breaches``         (K, 4)          index of the first state inside, boat a, boat b, closest distance m
+``violations``       (K, 4)          index of the first state inside, boat a, boat b, closest distance m
 ===================  ==============  =======================================================================
 
-``wanted`` and ``sent`` are the names of ``nominal`` and ``filtered`` in files of 0.9.0 and before, which are read.
+Files of 0.9.0 and before, which are read, say ``wanted``, ``sent`` and ``breaches`` for the last words above.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from typing import Any
 
 import numpy as np
 from steerclear.shield.exceptions import TraceError
-from steerclear.shield.renamed import warn
+from steerclear.shield.renamed import Renamed, current_keys
 
 from .whole_file import check_finite, check_shapes, read_arrays, save_arrays
 
@@ -58,15 +58,12 @@ LAYOUT: dict[str, tuple[tuple[str | int, ...], Any]] = {
     "reason": (("T", "n"), np.uint8),
     "intervened": (("T", "n"), np.bool_),
     "safety_margin_m": (("T", "n"), np.float32),
-    "breaches": (("K", 4), np.float64),
+    "violations": (("K", 4), np.float64),
 }
 """Per array: its axes (T steps, n boats, K separation violations) and its type."""
 
 ARRAYS = tuple(LAYOUT)
 """Names of the arrays besides ``meta``."""
-
-RENAMED = {"wanted": "nominal", "sent": "filtered"}
-"""Names of arrays in 0.9.0 and before."""
 
 LATER = ("is_disabled",)
 """Arrays that files of older versions lack; `load` and `make_record` fill them in."""
@@ -120,16 +117,16 @@ def validate(record: Mapping[str, np.ndarray]) -> None:
     for name, (_, kind) in layout.items():
         if not np.can_cast(record[name].dtype, kind, "same_kind"):
             raise TraceError(f"the record's {name} holds {record[name].dtype}, expected {np.dtype(kind)}")
-    n, steps, breaches = len(meta["agent_ids"]), len(record["nominal"]), record["breaches"]
-    sizes = {"T": steps, "T+1": steps + 1, "n": n, "K": len(breaches)}
+    n, steps, violations = len(meta["agent_ids"]), len(record["nominal"]), record["violations"]
+    sizes = {"T": steps, "T+1": steps + 1, "n": n, "K": len(violations)}
     check_shapes(record, {name: axes for name, (axes, _) in layout.items()}, sizes, "the record's ", _AGAIN)
-    finite = ("position", "heading_deg", "speed_mps", "flag_position", "breaches")
+    finite = ("position", "heading_deg", "speed_mps", "flag_position", "violations")
     check_finite(record, finite, "the record's ", _AGAIN)
     for name in ("position", "flag_position"):
         if np.abs(record[name]).max(initial=0.0) > FARTHEST_M:
             raise TraceError(f"the record's {name} is over {FARTHEST_M / 1e3:g} km away; give positions in m")
-    if not ((breaches[:, :3] >= 0).all() and (breaches[:, 0] <= steps).all() and (breaches[:, 1:3] < n).all()):
-        raise TraceError(f"the record's breaches name a step beyond {steps} or a boat beyond {n - 1}. {_AGAIN}")
+    if not ((violations[:, :3] >= 0).all() and (violations[:, 0] <= steps).all() and (violations[:, 1:3] < n).all()):
+        raise TraceError(f"the record's violations name a step beyond {steps} or a boat beyond {n - 1}. {_AGAIN}")
     if len(meta["team"]) != n or len(meta["platforms"]) != n:
         raise TraceError(f"meta's team and platforms must have one entry for each of the {n} boats. {_AGAIN}")
 
@@ -140,7 +137,7 @@ def make_record(meta: Mapping[str, Any], **arrays: Any) -> Record:
     Raises:
         TraceError: An array is missing, unknown, or does not fit the others.
     """
-    arrays = _renamed(arrays)
+    arrays = current_keys(arrays)
     unknown = sorted(set(arrays) - set(ARRAYS))
     if unknown:
         raise TraceError(f"a record has no array {', '.join(unknown)}; it has {', '.join(ARRAYS)}.")
@@ -159,7 +156,7 @@ def save(record: Mapping[str, np.ndarray], path: str | os.PathLike[str]) -> Path
     Raises:
         TraceError: The record is incomplete, or the folder cannot be written to.
     """
-    record = _renamed(record)
+    record = current_keys(record)
     validate(record)
     target = Path(path)
     if target.suffix != ".npz":
@@ -174,7 +171,7 @@ def load(path: str | os.PathLike[str]) -> Record:
     Raises:
         TraceError: The file is missing, cut, not a record, or lacks an array.
     """
-    record = _renamed(read_arrays(path, "record", _AGAIN))
+    record = current_keys(read_arrays(path, "record", _AGAIN))
     try:
         validate(record)
     except TraceError as error:
@@ -182,24 +179,9 @@ def load(path: str | os.PathLike[str]) -> Record:
     return _filled(record)
 
 
-class _Renamed(dict[str, np.ndarray]):
-    """A record that also answers the old names of its arrays, with a warning."""
-
-    def __missing__(self, name: str) -> np.ndarray:
-        if name not in RENAMED:
-            raise KeyError(name)
-        warn(name, RENAMED[name], stacklevel=2)
-        return self[RENAMED[name]]
-
-
-def _renamed(record: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the arrays under their present names."""
-    return {RENAMED.get(name, name): values for name, values in record.items()}
-
-
 def _filled(record: Record) -> Record:
     """Add the arrays that older versions did not write; no boat was disabled then."""
-    return _Renamed({"is_disabled": np.zeros_like(record["is_tagged"]), **record})
+    return Renamed({"is_disabled": np.zeros_like(record["is_tagged"]), **record})
 
 
 def plain(value: Any) -> Any:

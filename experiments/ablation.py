@@ -16,7 +16,7 @@ from steerclear import policies
 from steerclear.shield.exceptions import ConfigError
 
 from .game_metrics import DEFAULT_PENALTY
-from .metrics import RADII_M, breach_column, check, game_goals, game_metrics_of, pairs_of
+from .metrics import RADII_M, check, game_goals, game_metrics_of, pairs_of, violation_column
 from .play.conditions import CALM, Conditions
 from .play.match import play_again, play_job
 from .play.spec import ANSWER_S, SIDES, MatchSpec
@@ -26,7 +26,7 @@ from .result_files import table_name
 from .runner import RESULTS_FILE, Experiment, Run
 from .statistics import DIFFERENCE, summarise
 from .tables import COVERED_HEAD, LEFT_HEAD
-from .verdicts import COVERED, OFF, ON, all_breaches, state_of, summarise_verdicts
+from .verdicts import COVERED, OFF, ON, all_violations, state_of, summarise_verdicts
 from .warming import compile_game, compile_judge, compile_shield
 from .workers import Row, Workers
 
@@ -172,7 +172,7 @@ def results_of(run: Run, settings: AblationSettings, is_quick: bool = False) -> 
         "held": held_games(rows),
         "pairings": [one | ({"heads": heads} if (heads := settings.heads(one["pairing"])) else {}) for one in pairings],
         "goals": goals,
-        "breaches": all_breaches(rows),
+        "violations": all_violations(rows),
     }
 
 
@@ -238,7 +238,7 @@ def write_results(run: Run, results: dict[str, Any], records: Sequence[Any] = ()
         label = f"{played['pairing']}, game {played['game']}: without the shield and with it"
         links = [{"label": label, "path": files["replay"]}]
     rows = with_states(run.rows, results["settings"]["covered"])
-    flat = [{name: value for name, value in row.items() if name != "breaches"} for row in rows]
+    flat = [{name: value for name, value in row.items() if name != "violations"} for row in rows]
     files["report"] = write_report({**results, "games": flat, "replays": links}, run.folder / "report.html").name
     run.write(results)
 
@@ -255,12 +255,12 @@ def replay_of(
     if len(played) < len(chosen):
         return None
     again = [played[spec.key] for spec in chosen]
-    columns = [breach_column(kind, separation_m) for kind in ("teammate", "opponent")]
+    columns = [violation_column(kind, separation_m) for kind in ("teammate", "opponent")]
     entry = {
         "pairing": pair[0]["pairing"],
         "game": pair[0]["game"],
-        "breaches_off": sum(int(pair[0][column]) for column in columns),
-        "breaches_on": sum(int(pair[1][column]) for column in columns),
+        "violations_off": sum(int(pair[0][column]) for column in columns),
+        "violations_on": sum(int(pair[1][column]) for column in columns),
         "same_as_played": all(same_game(row, result.row) for row, result in zip(pair, again, strict=True)),
     }
     return entry, [result.record for result in again]
@@ -273,7 +273,7 @@ def most_instructive(table: pd.DataFrame, separation_m: float) -> tuple[Row, Row
         return None
     blue = pairs["side_on"] == "blue"  # the replay opens on a game whose shielded team is blue
     pairs = pairs[blue] if blue.any() else pairs
-    hits = sum(pairs[breach_column(kind, separation_m) + "_off"] for kind in ("teammate", "opponent"))
+    hits = sum(pairs[violation_column(kind, separation_m) + "_off"] for kind in ("teammate", "opponent"))
     chosen = pairs.iloc[int(hits.to_numpy().argmax())]
     rows = table.to_dict("records")
     off, on = (
@@ -291,7 +291,7 @@ def spec_of(row: Row, specs: Sequence[MatchSpec]) -> MatchSpec:
 
 def same_game(first: Row, second: Row) -> bool:
     """Tell whether two rows are the same game; times of computing may differ."""
-    both = ((first.get(name), value) for name, value in second.items() if name not in (*TIMED, "breaches"))
+    both = ((first.get(name), value) for name, value in second.items() if name not in (*TIMED, "violations"))
     return all(bool(one == two or (two is None and (one is None or one != one))) for one, two in both)
 
 

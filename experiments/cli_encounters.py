@@ -61,7 +61,7 @@ def encounters(
     ] = "heron,surveyor",
     family: Annotated[str, o.option("A,B", "Families of encounters, or all.")] = "all",
     n: Annotated[int, o.option("N", "Encounters per family, platforms and filter.", "--n")] = 1000,
-    guard: Annotated[
+    safety_filter: Annotated[
         list[str] | None,
         o.option("A,B", "none, shield, reach, gatekeeper, pl-cbf (:KEY=VALUE,...), or a textbook.", *FILTER),
     ] = None,
@@ -73,19 +73,19 @@ def encounters(
 
     Exit status: 0 done, 1 a shield did not keep a goal of no violations, 2 bad input, 130 interrupted.
     """
-    guards = tuple(dict.fromkeys(name for text in guard or ["shield"] for name in parse_filters(text)))
+    filters = tuple(dict.fromkeys(name for text in safety_filter or ["shield"] for name in parse_filters(text)))
     if scene:
         held = {"--platform": platform != "heron,surveyor", "--family": family != "all", "--n": n != 1000}
         held |= {f"--{name}": value != getattr(SceneOptions, name) for name, value in vars(scenes).items()}
         unused = {"--jobs": where.jobs is not None, "--resume": where.resume, "--json": where.json_file is not None}
         _refuse(held | {"--seed": seed != 0}, "a scene file holds its own; leave it out, or edit the file")
         _refuse(unused, "scenes are played one after another and leave no results; leave it out")
-        finish(play_scene_files(scene, guards, where.folder, not no_judge))
+        finish(play_scene_files(scene, filters, where.folder, not no_judge))
         return
     families = _names(family, "--family", f"all, or {', '.join(FAMILIES)}")
     families = tuple(FAMILIES) if families == ("all",) else families
-    o.check_used({"--noise": guards == (NONE,) and scenes.noise != 0.0}, "no filter looks; add --filter shield")
-    settings = Settings(platform_pairs(platform), families, guards, n, seed, scenes.given(), not no_judge)
+    o.check_used({"--noise": filters == (NONE,) and scenes.noise != 0.0}, "no filter looks; add --filter shield")
+    settings = Settings(platform_pairs(platform), families, filters, n, seed, scenes.given(), not no_judge)
     run = where.run(settings.experiment())
     results = results_of(run)
     if results["cells"]:
@@ -141,11 +141,11 @@ def _show(results: dict[str, Any], folder: Path) -> None:
         console.print(f"{LEGEND}\n", style="dim")
     if results["goals"]:
         console.print(goals_table(results["goals"]), "")
-    say(*(f"not played: {one['guard']}, {one['family']}: {one['error']}" for one in results["failed"]))
+    say(*(f"not played: {one['filter']}, {one['family']}: {one['error']}" for one in results["failed"]))
     say(*(folder / name for name in results["files"].values()))
 
 
-def play_scene_files(paths: Sequence[Path], guards: Sequence[str], folder: Path | None, judge: bool = True) -> bool:
+def play_scene_files(paths: Sequence[Path], filters: Sequence[str], folder: Path | None, judge: bool = True) -> bool:
     """Play every scene of the files with every filter; print a table, write a replay when there is a folder.
 
     Returns:
@@ -159,15 +159,21 @@ def play_scene_files(paths: Sequence[Path], guards: Sequence[str], folder: Path 
     rows, records, avoided = [], [], True
     for path in paths:
         scenes, conditions = read_scene(path)
-        for guard in guards:
-            columns = measure_chunk(scenes, guard, conditions, judge)
-            hits, avoidable = columns["breaches_teammate"] + columns["breaches_opponent"], columns["avoidable"].sum()
+        for safety_filter in filters:
+            columns = measure_chunk(scenes, safety_filter, conditions, judge)
+            hits, avoidable = (
+                columns["violations_teammate"] + columns["violations_opponent"],
+                columns["avoidable"].sum(),
+            )
             closest = number_text(float(columns["closest_m"].min()))
-            rows.append([path.name, guard, closest, f"{hits.sum():.0f}", f"{avoidable:.0f}"])
-            avoided = avoided and not (avoidable and is_shield(guard))
+            rows.append([path.name, safety_filter, closest, f"{hits.sum():.0f}", f"{avoidable:.0f}"])
+            avoided = avoided and not (avoidable and is_shield(safety_filter))
             if replay is not None:
-                played, worst = play(scenes, guard, conditions), int(columns["game"][columns["closest_m"].argmin()])
-                records.append(record_of(played, worst, f"{path.stem}, {guard}", guard != NONE))
+                played, worst = (
+                    play(scenes, safety_filter, conditions),
+                    int(columns["game"][columns["closest_m"].argmin()]),
+                )
+                records.append(record_of(played, worst, f"{path.stem}, {safety_filter}", safety_filter != NONE))
     out().print(titled("Scenes", ["file", "filter", "closest, m", "violations", "avoidable"], rows))
     if replay is not None:
         make_folder(replay.parent)
@@ -182,7 +188,7 @@ class SearchOptions:
     platform: Annotated[str, o.option("A[/B]", "Own platform, or own/attackers'.")] = "heron"
     attackers: Annotated[int, o.option("N", "Attackers, 1 to 3.")] = 1
     own: Annotated[int, o.option("N", "Own boats, 1 to 6.")] = 1
-    guard: Annotated[str, o.option("NAME", "Safety filter to attack, as in encounters.", *FILTER)] = "shield"
+    safety_filter: Annotated[str, o.option("NAME", "Safety filter to attack, as in encounters.", *FILTER)] = "shield"
     restarts: Annotated[int, o.option("N", "Searches, each from its own start.")] = 8
     population: Annotated[int, o.option("N", "Opponents per generation.")] = 64
     generations: Annotated[int, o.option("N", "Generations per search, at most.")] = 30
@@ -199,15 +205,15 @@ def attack(
 
     Exit status: 0 done, 1 an avoidable violation with the shield on, 2 bad input, 130 interrupted.
     """
-    guards = parse_filters(what.guard)
-    if len(guards) != 1:
-        raise ConfigError(f"--filter names {len(guards)} safety filters; attack one at a time")
+    filters = parse_filters(what.safety_filter)
+    if len(filters) != 1:
+        raise ConfigError(f"--filter names {len(filters)} safety filters; attack one at a time")
     pairs = platform_pairs(what.platform)
     if len(pairs) != 1:
         raise ConfigError(f"attack takes one --platform, own or own/attackers', not {len(pairs)}")
     check_count("--restarts", what.restarts, 1, MOST_PLAYED)
     given, sizes = scenes.given(), (what.population, what.generations)
-    first = Search(*pairs[0], what.attackers, what.own, guards[0], given, what.seed, 0, *sizes)
+    first = Search(*pairs[0], what.attackers, what.own, filters[0], given, what.seed, 0, *sizes)
     run = where.run(experiment_of(first, what.restarts))
     results = write_searches(run)
     if not run.interrupted:

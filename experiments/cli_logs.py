@@ -213,7 +213,7 @@ def _simulate(boats: SimFleet, plan: Plan, duration_s: float | None) -> bool:
 
 def _show_boats(content: dict[str, Any], files: list[str]) -> None:
     out().print(approaches_table(content))
-    if content["breaches"] is not None:
+    if content["violations"] is not None:
         out().print(verdicts_table(content))
     say(*files)
     if not content["played"]:
@@ -223,8 +223,8 @@ def _show_boats(content: dict[str, Any], files: list[str]) -> None:
 @command()
 def replay(
     log: Annotated[Path, typer.Argument(help="Black-box log (.mcap) that deploy wrote.")],
-    judge_breaches: Annotated[
-        bool, o.flag("Also tell how close boats came, and judge which breaches were avoidable.", "--judge")
+    judge_violations: Annotated[
+        bool, o.flag("Also tell how close boats came, and judge which violations were avoidable.", "--judge")
     ] = False,
     html: Annotated[Path | None, o.flag("Write a replay to scrub in a browser; a new file."), NEW] = None,
     key: Annotated[Path | None, o.flag("Key file of the boats: check the codes of a log written with signing.")] = None,
@@ -238,8 +238,8 @@ def replay(
     started = time.perf_counter()
     check_ending(html, "--html", ".html", ".htm")
     with LogReader(log, None if key is None else read_key(key)) as reader:
-        found = replay_log(reader, keep_tracks=judge_breaches or html is not None)
-    if judge_breaches:
+        found = replay_log(reader, keep_tracks=judge_violations or html is not None)
+    if judge_violations:
         judge(found)
     files = []
     if html is not None and found.record is not None:
@@ -247,7 +247,7 @@ def replay(
     show(out(), found)
     say(*files)
     if json_file is not None:
-        settings = {"log": str(log), "judge": judge_breaches}
+        settings = {"log": str(log), "judge": judge_violations}
         head = head_of("replay", settings, started)
         write_json(json_file, {**head, "log": str(log), **as_content(found), "files": files})
     finish(found.proof.holds)

@@ -21,6 +21,7 @@ from steerclear.shield.jit import kept_in
 from steerclear.shield.platforms import get_platform, known_platforms
 from steerclear.shield.platforms.files import PlatformFile, is_path, load_platform, to_text
 from steerclear.shield.platforms.schema import ENTRIES, GAINS, KIND_WORDS, MEASURED
+from steerclear.shield.renamed import current_keys
 from steerclear.shield.tables.files import read_table
 
 from . import cli_options as o
@@ -112,7 +113,7 @@ def _read_results(source: Path) -> dict[str, Any]:
     content = read_json(path, "results", "give a results folder or a JSON file")
     if not isinstance(content, dict):
         raise ConfigError(f"{path} holds no results; give a results folder or a JSON file of {SOURCES}")
-    return content
+    return dict(current_keys(content))
 
 
 @command()

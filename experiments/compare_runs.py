@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.renamed import current_keys
 
 from .metrics import Metric, game_metrics_of
 from .result_files import read_json
@@ -44,7 +45,7 @@ def read_run(folder: Path) -> PlayedRun:
     if not folder.is_dir():
         raise ConfigError(f"{folder} is no folder; {remedy}")
     check_version(folder)
-    content = read_json(folder / RESULTS_FILE, "results", remedy)
+    content = current_keys(read_json(folder / RESULTS_FILE, "results", remedy))
     command = content.get("command") if isinstance(content, dict) else None
     if command not in COMMANDS:
         raise ConfigError(f"{folder} holds results of {command!r}, not of games; {remedy}")
@@ -105,7 +106,7 @@ def compare_runs(first: PlayedRun, second: PlayedRun, seed: int = 0) -> dict[str
                 f"{second.settings[name]!r}), so their games are no pairs; play both alike but for what you compare"
             )
     pairs = _paired(first, second)
-    begin = "breaches_opponent_"  # radii at which both counted
+    begin = "violations_opponent_"  # radii at which both counted
     counted = ({name for name in run.table if name.startswith(begin)} for run in (first, second))
     radii_m = sorted(float(name.removeprefix(begin).removesuffix("m")) for name in set.intersection(*counted))
     metrics = [metric for metric in game_metrics_of(radii_m) if metric.paired]

@@ -22,7 +22,7 @@ from .docs_encounters import comparison_page
 from .encounters.attack import KEYS as ATTACK
 from .encounters.figures import KEYS as ENCOUNTERS
 from .markdown import MADE, table
-from .metrics import RADII_M, breach_column, game_metrics_of
+from .metrics import RADII_M, game_metrics_of, violation_column
 from .page import template
 from .reach.pages import played_page, sets_page, tables_page
 from .report import Report, Section, game_report, made_of
@@ -142,7 +142,7 @@ def _page_of(content: Results, folder: Path) -> Page:
     picture = None
     if command == "ablate" and content["pairings"]:
         radius_m = float((settings.get("shield") or {}).get("separation_m", RADII_M[0]))
-        metrics = [(breach_column(k, radius_m), f"hits with {k}s per game, {radius_m:g} m") for k in _KINDS]
+        metrics = [(violation_column(k, radius_m), f"hits with {k}s per game, {radius_m:g} m") for k in _KINDS]
         figure = plots.off_on(content["pairings"], [*metrics, ("captures", "captures per game")])
         picture = plots.png(figure, folder / f"{stem}.png")
     return game_report(content).page(f"{stem}.md", picture)
@@ -218,7 +218,7 @@ def price_page(found: Sequence[Results], folder: Path) -> Page:
     panels: dict[str, list[tuple[str, float, float, float]]] = {}
     for (preset, radius_m, pairing), runs in sorted(groups.items()):
         runs.sort(key=lambda run: run[0])
-        hits = {kind: breach_column(kind, radius_m) for kind in _KINDS}
+        hits = {kind: violation_column(kind, radius_m) for kind in _KINDS}
         columns = (
             *_PRICE_COLUMNS,
             ("hits opponents", hits["opponent"], "on"),

@@ -17,13 +17,13 @@ from .statistics import upper_bound
 from .tables import Table, number_text
 
 CONDITIONS = ("radius_m", "delay_s", "noise_m", "current_mps")
-COUNTS = ("encounters", "breached", "avoidable", "unavoidable", "not_judged", "deadlocked")
-OUTSIDE = ("started_outside", "breaches_outside")
+COUNTS = ("encounters", "violated", "avoidable", "unavoidable", "not_judged", "deadlocked")
+OUTSIDE = ("started_outside", "violations_outside")
 MEANS: tuple[str, ...] = ("changed_percent", "goal_time_ratio", "reversals_per_min", "decision_us")
 MEANS += ("never_arrived_percent", "inactive_percent")
-NEEDED = ("family", "guard", "own", "other", "seed", *CONDITIONS, *COUNTS, *OUTSIDE, *MEANS)
-NO_GUARD = "none"
-RULE = "fewest avoidable or unjudged, then fewest breached, then fewest commands changed"
+NEEDED = ("family", "filter", "own", "other", "seed", *CONDITIONS, *COUNTS, *OUTSIDE, *MEANS)
+NO_FILTER = "none"
+RULE = "fewest avoidable or unjudged, then fewest with violations, then fewest commands changed"
 Cell = Mapping[str, Any]
 Met = dict[str, dict[str, Cell]]
 """Cells of encounters that are alike but for the filter: by filter and family."""
@@ -45,7 +45,7 @@ COLUMNS: dict[str, Callable[[Cell], Any]] = {
     "avoidable": lambda one: _count(one, "avoidable"),
     "unavoidable": lambda one: one["unavoidable"],
     "not judged": lambda one: one["not_judged"],
-    "breached": lambda one: _count(one, "breached"),
+    "violated": lambda one: _count(one, "violated"),
     "of those started outside": lambda one: _count(one, *reversed(OUTSIDE)) if one["started_outside"] else "",
     "commands changed": lambda one: f"{one['changed_percent']:.1f} %",
     "left alone": lambda one: _number(one["inactive_percent"]),
@@ -64,7 +64,7 @@ def comparison_page(found: Sequence[Mapping[str, Any]], folder: Path) -> tuple[s
     Raises:
         ConfigError: no cell to compare, or one that lacks a figure.
     """
-    sections, panels, guards = (
+    sections, panels, filters = (
         list[Section](),
         list[tuple[str, list[tuple[str, float, float, float]]]](),
         dict[str, Met](),
@@ -76,16 +76,18 @@ def comparison_page(found: Sequence[Mapping[str, Any]], folder: Path) -> tuple[s
         radius, *extras = conditions
         given = words_of(dict(zip(CONDITIONS[1:], extras, strict=True)))
         title = ", ".join(filter(None, [f"{own} meets {other}, {radius:g} m", given]))
-        totals = {guard: pool([cells[family] for family in families]) for guard, cells in met.items()}
+        totals = {safety_filter: pool([cells[family] for family in families]) for safety_filter, cells in met.items()}
         sections.append(_section(title, seed, met, families, totals))
-        panels.append((title, [_point(guard, one) for guard, one in totals.items()]))
-        guards |= dict.fromkeys(met, met)
+        panels.append((title, [_point(safety_filter, one) for safety_filter, one in totals.items()]))
+        filters |= dict.fromkeys(met, met)
     if not sections:
-        raise ConfigError("the encounter results have no family that all guards met; run them with the same --families")
-    words = ("commands changed, %", "encounters breached, %")
+        raise ConfigError(
+            "the encounter results have no family that all filters met; run them with the same --families"
+        )
+    words = ("commands changed, %", "encounters with violations, %")
     picture = plots.png(plots.scatter(panels, words), folder / "comparison.png")
     versions = sorted({str((content.get("versions") or {}).get("steerclear")) for content in found})
-    title = "Guards on the same encounters" if len(guards) > 1 else f"Encounters with {next(iter(guards))}"
+    title = "Filters on the same encounters" if len(filters) > 1 else f"Encounters with {next(iter(filters))}"
     intro = template("comparison.txt").strip().format(versions=line(", ".join(versions)))
     return Report(title, "", notes=[intro], sections=sections).page("comparison.md", picture)
 
@@ -102,7 +104,7 @@ def _contests(found: Sequence[Mapping[str, Any]]) -> dict[tuple[Any, ...], Met]:
                 words = f"a cell of the encounter results has no {', '.join(missing)}; run `encounters` again"
                 raise ConfigError(words)
             key = (cell["own"], cell["other"], cell["seed"], *(float(cell[name]) for name in CONDITIONS))
-            groups.setdefault(key, {}).setdefault(cell["guard"], {})[cell["family"]] = cell
+            groups.setdefault(key, {}).setdefault(cell["filter"], {})[cell["family"]] = cell
     return groups
 
 
@@ -127,27 +129,30 @@ def pool(cells: Sequence[Cell]) -> dict[str, Any]:
 def best_of(totals: Mapping[str, Cell]) -> str | None:
     """The best filter by `RULE`; None without any."""
 
-    def rank(guard: str) -> tuple[int, int, float]:
-        one = totals[guard]
-        return one["avoidable"] + one["not_judged"], one["breached"], one["changed_percent"]
+    def rank(safety_filter: str) -> tuple[int, int, float]:
+        one = totals[safety_filter]
+        return one["avoidable"] + one["not_judged"], one["violated"], one["changed_percent"]
 
-    return min((guard for guard in totals if guard != NO_GUARD), key=rank, default=None)
+    return min((safety_filter for safety_filter in totals if safety_filter != NO_FILTER), key=rank, default=None)
 
 
 def _section(title: str, seed: int, met: Met, families: Sequence[str], totals: Mapping[str, Cell]) -> Section:
     best = best_of(totals) if len(met) > 1 else None
-    rows = [_row(f"**{guard}**" if guard == best else guard, one) for guard, one in totals.items()]
+    rows = [
+        _row(f"**{safety_filter}**" if safety_filter == best else safety_filter, one)
+        for safety_filter, one in totals.items()
+    ]
     tables = [Table("", ["filter", *COLUMNS], rows)]
     if len(met) == 1:
         (cells,) = met.values()
         rows = [_row(family, cells[family]) for family in families]
         tables.append(Table("Family by family", ["", *COLUMNS], rows))
     else:
-        rows = [[f, *(f"{c[f]['breached']}, {c[f]['changed_percent']:.0f} %" for c in met.values())] for f in families]
-        tables.append(Table("Encounters breached, and share of commands changed", ["", *met], rows))
+        rows = [[f, *(f"{c[f]['violated']}, {c[f]['changed_percent']:.0f} %" for c in met.values())] for f in families]
+        tables.append(Table("Encounters with violations, and share of commands changed", ["", *met], rows))
     words = f"Families: {', '.join(families)}; seed {seed}."
     if left_out := [family for family in _families(met) if family not in families]:
-        words += f" Not met equally by all guards and left out: {', '.join(left_out)}."
+        words += f" Not met equally by all filters and left out: {', '.join(left_out)}."
     return Section(title, tables, f"Best ({RULE}): **{best}**. {words}" if best else words)
 
 
@@ -155,6 +160,6 @@ def _row(name: str, one: Cell) -> list[Any]:
     return [name, *(text(one) for text in COLUMNS.values())]
 
 
-def _point(guard: str, one: Cell) -> tuple[str, float, float, float]:
-    upper = upper_bound(one["breached"], one["encounters"])
-    return guard, one["changed_percent"], 100.0 * one["breached"] / one["encounters"], 100.0 * upper
+def _point(safety_filter: str, one: Cell) -> tuple[str, float, float, float]:
+    upper = upper_bound(one["violated"], one["encounters"])
+    return safety_filter, one["changed_percent"], 100.0 * one["violated"] / one["encounters"], 100.0 * upper

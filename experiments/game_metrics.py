@@ -1,6 +1,6 @@
 """What happened in a game, as numbers, computed from its record alone.
 
-A separation violation ("breach") is a pair of boats whose centres come within a radius of each other. It is counted
+A separation violation is a pair of boats whose centres come within a radius of each other. It is counted
 once per entry, per pair: the pair is inside after this step and was not after the one before. The start position itself
 is not counted, so a pair that starts inside counts at the first step, as in the reference simulator. Distances are
 sampled once per step (0.1 s).
@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from steerclear.env.record import NOT_COVERED, Record, find_breaches, read_meta
+from steerclear.env.record import NOT_COVERED, Record, find_violations, read_meta
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array, BoolArray, kernel
 
-from .metrics import RADII_M, breach_column, game_metrics_of
+from .metrics import RADII_M, game_metrics_of, violation_column
 
 KINDS = {"teammate": 2, "opponent": 1}
 """Kinds of pairs of a team, by how many of the two boats are its own."""
@@ -64,14 +64,14 @@ DEADLOCK_S = 10.0
 
 
 @kernel
-def deadlocks(speed_mps: Array, wanted_mps: Array, own: BoolArray, longest: int, out: Array) -> None:
+def deadlocks(speed_mps: Array, nominal_mps: Array, own: BoolArray, longest: int, out: Array) -> None:
     """Count pairs of own boats that both want to move and both stay below `STILL_MPS` for over ``longest`` steps.
 
     A pair counts once for every time that begins.
 
     Args:
         speed_mps: (T, B, n) speed after each step of B games.
-        wanted_mps: (T, B, n) nominal speed in it, before a shield.
+        nominal_mps: (T, B, n) nominal speed in it, before a shield.
         own: (n,).
         longest: steps that are still no deadlock.
         out: (B,) written.
@@ -84,11 +84,11 @@ def deadlocks(speed_mps: Array, wanted_mps: Array, own: BoolArray, longest: int,
             for i in range(n):
                 if not own[i]:
                     continue
-                stuck = speed_mps[t, b, i] < STILL_MPS and wanted_mps[t, b, i] > STILL_MPS
+                stuck = speed_mps[t, b, i] < STILL_MPS and nominal_mps[t, b, i] > STILL_MPS
                 for j in range(i):
                     if not own[j]:
                         continue
-                    if stuck and speed_mps[t, b, j] < STILL_MPS and wanted_mps[t, b, j] > STILL_MPS:
+                    if stuck and speed_mps[t, b, j] < STILL_MPS and nominal_mps[t, b, j] > STILL_MPS:
                         still[i, j] += 1
                         if still[i, j] == longest + 1:
                             out[b] += 1.0
@@ -96,11 +96,11 @@ def deadlocks(speed_mps: Array, wanted_mps: Array, own: BoolArray, longest: int,
                         still[i, j] = 0
 
 
-def count_deadlocks(speed_mps: Array, wanted_mps: Array, own: BoolArray, dt_s: float) -> int:
+def count_deadlocks(speed_mps: Array, nominal_mps: Array, own: BoolArray, dt_s: float) -> int:
     """Count the deadlocks of one game's own boats (n,), from speeds after each step and nominal speeds in it (T, n)."""
-    speed, wanted = (np.ascontiguousarray(one[:, None], dtype=np.float64) for one in (speed_mps, wanted_mps))
+    speed, nominal = (np.ascontiguousarray(one[:, None], dtype=np.float64) for one in (speed_mps, nominal_mps))
     found = np.empty(1)
-    deadlocks(speed, wanted, np.ascontiguousarray(own), round(DEADLOCK_S / dt_s), found)
+    deadlocks(speed, nominal, np.ascontiguousarray(own), round(DEADLOCK_S / dt_s), found)
     return int(found[0])
 
 
@@ -159,10 +159,10 @@ def tally(
     """Count for one team, 0 blue or 1 red; ``driven`` (T, n): boats that the game drove, which obey no policy.
 
     Returns:
-        Flat columns: ``breaches_teammate_2.5m`` and so on at each radius, of them those of an own boat that was driven,
-        ``breaches_driven_2.5m``, ``breaches_driven_teammate_2.5m``; ``closest_*_m`` (None without such a pair),
-        ``clean_games`` (none at the smallest radius), ``collisions`` (what the game's score counts), the columns of
-        `shield_columns`, ``deadlocks`` and what metrics measure by themselves.
+        Flat columns: ``violations_teammate_2.5m`` and so on at each radius, of them those of an own boat that was
+        driven, ``violations_driven_2.5m``, ``violations_driven_teammate_2.5m``; ``closest_*_m`` (None without such a
+        pair), ``clean_games`` (none at the smallest radius), ``collisions`` (what the game's score counts), the columns
+        of `shield_columns`, ``deadlocks`` and what metrics measure by themselves.
     """
     meta, position = read_meta(record), record["position"]
     team, dt_s = np.asarray(meta["team"]), float(meta["dt_s"])
@@ -172,21 +172,21 @@ def tally(
     closest_m = {f"closest_{kind}_m": value if np.isfinite(value) else None for kind, value in closest.items()}
     columns: dict[str, Any] = {}
     for radius_m in radii_m:
-        rows = find_breaches(position, radius_m)[:, :3].astype(np.int64)
+        rows = find_violations(position, radius_m)[:, :3].astype(np.int64)
         boats, in_it = rows[:, 1:], own[rows[:, 1:]]
         hit = None if driven is None else (in_it & driven[rows[:, :1] - 1, boats]).any(axis=1)
         for kind, count in KINDS.items():
             of_kind = in_it.sum(axis=1) == count
-            columns[breach_column(kind, radius_m)] = int(of_kind.sum())
+            columns[violation_column(kind, radius_m)] = int(of_kind.sum())
             if hit is not None:
-                columns[breach_column(f"driven_{kind}", radius_m)] = int((hit & of_kind).sum())
+                columns[violation_column(f"driven_{kind}", radius_m)] = int((hit & of_kind).sum())
         if hit is not None:
-            columns[breach_column("driven", radius_m)] = int(hit.sum())
+            columns[violation_column("driven", radius_m)] = int(hit.sum())
     return {
         **columns,
         **closest_m,
         "closest_m": min((value for value in closest_m.values() if value is not None), default=None),
-        "clean_games": not any(columns[breach_column(kind, min(radii_m))] for kind in KINDS),
+        "clean_games": not any(columns[violation_column(kind, min(radii_m))] for kind in KINDS),
         "collisions": scored_collisions(record, meta, side),
         **shield_columns(record, own, dt_s),
         "deadlocks": count_deadlocks(record["speed_mps"][1:], record["nominal"][..., 0], own, dt_s),
@@ -200,7 +200,7 @@ def scored_collisions(record: Record, meta: Mapping[str, Any], side: int) -> int
     position, own = record["position"][:: int(meta.get("decision_steps", 1))], np.asarray(meta["team"]) == side
     radius_m, total = np.broadcast_to(np.asarray(meta["agent_radius_m"], dtype=np.float64), len(own)), 0
     for apart_m in np.unique(radius_m[:, None] + radius_m):
-        boats = find_breaches(position, apart_m)[:, 1:3].astype(np.int64)
+        boats = find_violations(position, apart_m)[:, 1:3].astype(np.int64)
         total += int(own[boats[radius_m[boats].sum(axis=1) == apart_m]].sum())
     return total
 
@@ -211,13 +211,13 @@ def shield_columns(record: Record, own: NDArray[np.bool_], dt_s: float) -> dict[
     A changed step is one boat's in which its filtered command differs from the nominal one. Means are over the changed
     steps, None where there are none.
     """
-    wanted, sent = record["nominal"][:, own], record["filtered"][:, own]
+    nominal, filtered = record["nominal"][:, own], record["filtered"][:, own]
     covered = int((record["reason"][:, own] != NOT_COVERED).sum())
     changed = record["intervened"][:, own]
-    turned_deg = np.abs(heading_change_deg(sent[..., 1], wanted[..., 1]))[changed]
-    slowed_mps = np.abs(sent[..., 0] - wanted[..., 0])[changed]
-    minutes = len(wanted) * own.sum() * dt_s / 60.0
-    reversals = count_reversals(sent[..., 1], record["heading_deg"][:-1, own])
+    turned_deg = np.abs(heading_change_deg(filtered[..., 1], nominal[..., 1]))[changed]
+    slowed_mps = np.abs(filtered[..., 0] - nominal[..., 0])[changed]
+    minutes = len(nominal) * own.sum() * dt_s / 60.0
+    reversals = count_reversals(filtered[..., 1], record["heading_deg"][:-1, own])
     return {
         "covered_steps": covered,
         "changed_steps": int(changed.sum()),

@@ -55,9 +55,9 @@ class Metric:
         return self.name or self.column
 
 
-def breach_column(kind: str, radius_m: float) -> str:
-    """Name the column of a count: `breaches_opponent_2.5m`."""
-    return f"breaches_{kind}_{float(radius_m)}m"
+def violation_column(kind: str, radius_m: float) -> str:
+    """Name the column of a count: `violations_opponent_2.5m`."""
+    return f"violations_{kind}_{float(radius_m)}m"
 
 
 OWN: tuple[Metric, ...] = ()
@@ -84,9 +84,9 @@ def game_metrics_of(radii_m: Sequence[float] = RADII_M) -> list[Metric]:
         Metric("grabs", "count", "grabs", "", "flags grabbed"),
         Metric("tags", "count", "tags", "", "tags made"),
         Metric("tags_against", "count", "times tagged", "", "tags made by the other team: times tagged"),
-        *(Metric(breach_column("teammate", r), "count", f"hits teammates {r:g} m", "", mates) for r in radii_m),
-        *(Metric(breach_column("opponent", r), "count", f"hits opponents {r:g} m", "", opponents) for r in radii_m),
-        *(Metric(breach_column("driven", r), "count", f"game-controlled {r:g} m", "", driven) for r in radii_m),
+        *(Metric(violation_column("teammate", r), "count", f"hits teammates {r:g} m", "", mates) for r in radii_m),
+        *(Metric(violation_column("opponent", r), "count", f"hits opponents {r:g} m", "", opponents) for r in radii_m),
+        *(Metric(violation_column("driven", r), "count", f"game-controlled {r:g} m", "", driven) for r in radii_m),
         Metric("clean_games", "share", "games without hit", "", "whether the game had no hit at all", paired=False),
         Metric("closest_m", "mean", "closest, mean m", "m", "closest distance of an own boat to any other, m"),
         Metric("closest_m", "least", "closest of all, m", "m", "smallest of all games", "", "closest_of_all_m", False),
@@ -195,8 +195,8 @@ def game_goals(separation_m: float) -> list[Goal]:
     """What is asked of an ablation, all pairings together; hits of boats that the game drives obey nobody: no part."""
 
     def own_hits(pairs: pd.DataFrame, kind: str, state: str) -> Any:
-        driven = pairs.get(f"{breach_column(f'driven_{kind}', separation_m)}_{state}", 0)
-        return pairs[f"{breach_column(kind, separation_m)}_{state}"] - driven
+        driven = pairs.get(f"{violation_column(f'driven_{kind}', separation_m)}_{state}", 0)
+        return pairs[f"{violation_column(kind, separation_m)}_{state}"] - driven
 
     def paired(measure: Callable[[pd.DataFrame], Interval | None]) -> Callable[[pd.DataFrame], Interval | None]:
         return lambda table: measure(pairs) if len(pairs := pairs_of(table)) else None
@@ -218,7 +218,7 @@ def game_goals(separation_m: float) -> list[Goal]:
         return Interval(float(own_hits(pairs, "teammate", "on").sum()), float("nan"), float("nan"))
 
     def driven(kind: str) -> Callable[[pd.DataFrame], str]:
-        column = f"{breach_column(f'driven_{kind}', separation_m)}_on"
+        column = f"{violation_column(f'driven_{kind}', separation_m)}_on"
         return lambda table: _beside(pairs_of(table), column)
 
     at = f"at {separation_m:g} m, of boats the team commands"

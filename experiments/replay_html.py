@@ -3,8 +3,8 @@
 Replays pack a record into text small enough to sit inside a page. Every number becomes a code of 16 (or 8) bits:
 value = offset + scale * code, the largest code standing for NaN where there may be one. A column holds one series per
 boat and coordinate, each over all time indices. Codes are stored as differences modulo 2**bits, from the time index
-before (``against`` = "previous") or from another column (``sent`` from ``wanted``), which deflate then shrinks. All
-columns of a game are one run of bytes, little-endian, deflated and in base64. ``templates/replay_data.js`` is the
+before (``against`` = "previous") or from another column (``filtered`` from ``nominal``), which deflate then shrinks.
+All columns of a game are one run of bytes, little-endian, deflated and in base64. ``templates/replay_data.js`` is the
 reader.
 """
 
@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from steerclear.env.record import Record, find_breaches, read_meta, save, validate
+from steerclear.env.record import Record, find_violations, read_meta, save, validate
 from steerclear.env.render import Arena
 from steerclear.shield.exceptions import ConfigError
 
@@ -100,16 +100,16 @@ def pack(record: Record, title: str) -> dict[str, Any]:
     bits = HAS_FLAG * record["has_flag"] + TAGGED * record["is_tagged"] + OUT * record["oob"]
     packer.add_codes("bits", bits.T.astype(np.uint8), None)
     # a command counts where speed and heading are finite
-    wanted, sent = (
+    nominal, filtered = (
         np.where(np.isfinite(one).all(axis=-1, keepdims=True), one, np.nan)
         for one in (record["nominal"], record["filtered"])
     )
-    limits = span(np.stack([wanted[..., 0], sent[..., 0]]))
-    packer.add_numbers("wanted_speed", wanted[..., 0].T, "previous", limits)
-    packer.add_numbers("sent_speed", sent[..., 0].T, "wanted_speed", limits)
-    packer.add_angles("wanted_heading", wanted[..., 1].T, "previous")
-    packer.add_angles("sent_heading", sent[..., 1].T, "wanted_heading")
-    packer.add_numbers("certificate", record["safety_margin_m"].T.astype(np.float64), "previous")
+    limits = span(np.stack([nominal[..., 0], filtered[..., 0]]))
+    packer.add_numbers("nominal_speed", nominal[..., 0].T, "previous", limits)
+    packer.add_numbers("filtered_speed", filtered[..., 0].T, "nominal_speed", limits)
+    packer.add_angles("nominal_heading", nominal[..., 1].T, "previous")
+    packer.add_angles("filtered_heading", filtered[..., 1].T, "nominal_heading")
+    packer.add_numbers("safety_margin", record["safety_margin_m"].T.astype(np.float64), "previous")
     packer.add_codes("reason", record["reason"].T.astype(np.uint8), None)
     packer.add_codes("intervened", record["intervened"].T.astype(np.uint8), None)
     content = b"".join(packer.content)
@@ -119,7 +119,7 @@ def pack(record: Record, title: str) -> dict[str, Any]:
         "meta": page_meta(record),
         "steps": len(record["nominal"]),
         "columns": packer.columns,
-        "breaches": np.round(record["breaches"], 3).tolist(),
+        "violations": np.round(record["violations"], 3).tolist(),
         "captures": [[int(step), *map(int, record["captures"][step])] for step in (0, *changed)],
         "data": base64.b64encode(zlib.compress(content, 9)).decode(),
     }
@@ -178,9 +178,9 @@ def at_one_radius(records: Sequence[Record]) -> list[Record]:
     for record in records:
         meta = read_meta(record)
         if kept_m and not meta["shielded"] and meta["separation_m"] < max(kept_m):
-            breaches = find_breaches(record["position"], max(kept_m))
+            violations = find_violations(record["position"], max(kept_m))
             shown = json.dumps({**meta, "separation_m": max(kept_m)})
-            record = {**record, "meta": np.array(shown), "breaches": breaches}
+            record = {**record, "meta": np.array(shown), "violations": violations}
         found.append(record)
     return found
 

@@ -12,7 +12,7 @@ from markupsafe import Markup
 
 from . import plots
 from .markdown import MADE, goals_table, line, table
-from .metrics import RADII_M, REASONS, breach_column, game_metrics_of
+from .metrics import RADII_M, REASONS, game_metrics_of, violation_column
 from .page import render, write_page
 from .play.conditions import words_of
 from .tables import (
@@ -31,7 +31,7 @@ from .verdicts import COVERED, HEADS, OFF, ON, state_of, verdict_rows
 
 Summary = Mapping[str, Any]
 SHIELDS = ((OFF, "shield off"), (ON, "shield on"), (COVERED, f"shield {COVERED_HEAD}"))
-MOST_ROWS, MOST_BREACHES = 600, 200
+MOST_ROWS, MOST_VIOLATIONS = 600, 200
 CHANGED_SHARE_GOAL = 5.0
 STYLES = {"green": "good", "red": "bad", "yellow": "muted"}
 NOTE = (
@@ -191,7 +191,7 @@ def game_report(results: Mapping[str, Any]) -> Report:
     separation_m = float(
         settings.get("separation_m") or (settings.get("shield") or {}).get("separation_m") or RADII_M[0]
     )
-    breaches, games = results.get("breaches") or (), results.get("games") or ()
+    violations, games = results.get("violations") or (), results.get("games") or ()
     return Report(
         title=results.get("title") or _played(settings)[0],
         subtitle=_subtitle(results, separation_m),
@@ -205,7 +205,7 @@ def game_report(results: Mapping[str, Any]) -> Report:
             Section("Pairings", [*map(_pairing_table, pairings)], COVERED_WORDS if settings.get("covered") else ""),
             Section(
                 "Hits judged in hindsight",
-                [*map(_verdict_table, pairings), *([_breaches_table(breaches)] if breaches else [])],
+                [*map(_verdict_table, pairings), *([_violations_table(violations)] if violations else [])],
                 HINDSIGHT,
             ),
             made_of(results, results.get("failed") or []),
@@ -246,8 +246,8 @@ def _tiles(pairings: Sequence[Summary], separation_m: float) -> list[Tile]:
     pairings = [one for one in pairings if one["games_off"] and one["games_on"]] or pairings
     tiles = []
     for label, key, note in (
-        ("hits with opponents", breach_column("opponent", separation_m), hits),
-        ("hits with teammates", breach_column("teammate", separation_m), hits),
+        ("hits with opponents", violation_column("opponent", separation_m), hits),
+        ("hits with teammates", violation_column("teammate", separation_m), hits),
         ("captures", "captures", "per game"),
         ("closest distance", "closest_m", "m, mean of the games"),
         ("steps changed", "changed_share", "% of the commands decided"),
@@ -269,7 +269,7 @@ def _plots(pairings: Sequence[Summary], games: Sequence[Mapping[str, Any]], sepa
     hits = "hits with {}s per game, centres within " + f"{separation_m:g} m"
     return [
         *(
-            _bars(f"Hits with {kind}s", pairings, breach_column(kind, separation_m), hits.format(kind))
+            _bars(f"Hits with {kind}s", pairings, violation_column(kind, separation_m), hits.format(kind))
             for kind in ("opponent", "teammate")
         ),
         _bars("Captures", pairings, "captures", "captures per game"),
@@ -341,22 +341,22 @@ def _verdict_table(pairing: Summary) -> Table:
     return Table(pairing["pairing"], HEADS if rows else [], rows or [["Not judged."]], numbers=False)
 
 
-def _breaches_table(breaches: Sequence[Mapping[str, Any]]) -> Table:
-    """The judged hits, avoidable ones of shielded games first, the first `MOST_BREACHES` of them."""
-    order = sorted(breaches, key=lambda breach: (not breach["shielded"], breach["verdict"] != "avoidable"))
+def _violations_table(violations: Sequence[Mapping[str, Any]]) -> Table:
+    """The judged hits, avoidable ones of shielded games first, the first `MOST_VIOLATIONS` of them."""
+    order = sorted(violations, key=lambda violation: (not violation["shielded"], violation["verdict"] != "avoidable"))
     rows = []
-    for breach in order[:MOST_BREACHES]:
-        who = ", ".join(breach["responsible_boats"])
+    for violation in order[:MOST_VIOLATIONS]:
+        who = ", ".join(violation["responsible_boats"])
         shown = {
-            "game": f"{breach['pairing']}, {breach['game']}",
-            "shield": state_of(breach),
-            "time, s": number_text(breach["time_s"]),
-            "boats": ", ".join(breach["boats"]),
-            "closest, m": number_text(breach["closest_m"]),
-            "verdict": breach["verdict"].replace("_", " "),
-            "last moment, s": number_text(breach["last_preventable_s"]),
-            "theirs, s": number_text(breach["other_last_preventable_s"]),
-            "responsible": (breach["responsible"] or "-") + (f" ({who})" if who else ""),
+            "game": f"{violation['pairing']}, {violation['game']}",
+            "shield": state_of(violation),
+            "time, s": number_text(violation["time_s"]),
+            "boats": ", ".join(violation["boats"]),
+            "closest, m": number_text(violation["closest_m"]),
+            "verdict": violation["verdict"].replace("_", " "),
+            "last moment, s": number_text(violation["last_preventable_s"]),
+            "theirs, s": number_text(violation["other_last_preventable_s"]),
+            "responsible": (violation["responsible"] or "-") + (f" ({who})" if who else ""),
         }
         rows.append(shown)
     more = f"{len(order) - len(rows)} more in results.json." if len(order) > len(rows) else ""

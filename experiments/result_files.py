@@ -14,6 +14,7 @@ from typing import Any
 
 from filelock import BaseFileLock, FileLock, Timeout
 from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.renamed import earlier_keys
 
 MOST_BYTES = 256 * 2**20
 """Larger JSON files are none of ours."""
@@ -113,11 +114,15 @@ def read_json(path: Path, what: str, remedy: str) -> Any:
 def write_json(path: Path | None, content: Mapping[str, Any]) -> None:
     """Write JSON that every reader takes, where a path is given: not-a-number becomes null; it appears whole or not.
 
+    Keys that were renamed stand under their earlier names, too, in ``deprecated``, for one release.
+
     Raises:
         ConfigError: the file cannot be written.
     """
     if path is None:
         return
+    earlier = earlier_keys(content)
+    content = {**content, "deprecated": earlier} if earlier else content
     text = json.dumps(finite(content), indent=2, default=plain_value, allow_nan=False)
     part = path.with_name(f".{path.name}.part")
     with writing(f"{path}"):

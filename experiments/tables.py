@@ -68,7 +68,7 @@ def covered_table(summary: Mapping[str, Any]) -> Group | None:
     if not summary.get("games_covered"):
         return None
     shown = {key: head for key, head in COLUMNS.items() if "covered" in key}
-    chosen = [v for k, v in summary["metrics"].items() if k.startswith("breaches_") or k in _COVERED_SHOWN]
+    chosen = [v for k, v in summary["metrics"].items() if k.startswith("violations_") or k in _COVERED_SHOWN]
     return figures_table("Covering boats that the game drives", chosen, shown)
 
 

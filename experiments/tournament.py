@@ -17,7 +17,7 @@ from steerclear.shield.exceptions import ConfigError
 
 from . import plots
 from .game_metrics import DEFAULT_PENALTY, tally
-from .metrics import RADII_M, breach_column, judged
+from .metrics import RADII_M, judged, violation_column
 from .play.match import Match, MatchResult, play_again
 from .play.spec import ANSWER_S, SIDES, MatchSpec, near
 from .rankings import KEPT, SCRIPTED, all_tables, prices, seats, shown, state_results
@@ -170,16 +170,16 @@ def _counts(match: Match, result: MatchResult, separation_m: float, team: int) -
     spec, core, seat = match.spec, match.env.core, match.teams[team]
     shielded = spec.shields[team] is not None
     counts, failures = tally(result.record, team, spec.radii_m), seat.failures()
-    breaches = None
+    violations = None
     if spec.judge == "all" or shielded:  # the own team's are in the row already
-        breaches = result.row["breaches"] if team == spec.own_team else match.breaches(result.record, team)
-    avoidable = [breach["kind"] for breach in breaches or () if breach["verdict"] == "avoidable"]
+        violations = result.row["violations"] if team == spec.own_team else match.violations(result.record, team)
+    avoidable = [violation["kind"] for violation in violations or () if violation["verdict"] == "avoidable"]
     times_s = getattr(seat.policy, "think_times_s", None)
     return {
         "shielded": shielded,
         **{name: int(getattr(core, name)[0, team]) for name in ("captures", "grabs", "tags")},
-        **{f"hits_{kind}": counts[breach_column(kind, separation_m)] for kind in KINDS},
-        **{f"avoidable_{kind}": None if breaches is None else avoidable.count(kind) for kind in KINDS},
+        **{f"hits_{kind}": counts[violation_column(kind, separation_m)] for kind in KINDS},
+        **{f"avoidable_{kind}": None if violations is None else avoidable.count(kind) for kind in KINDS},
         **{name: counts[name] for name in ("collisions", "closest_m", "changed_share", "deadlocks")},
         "failures": failures.count,
         "usable_steps": failures.usable_steps,

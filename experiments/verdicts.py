@@ -1,7 +1,7 @@
 """Which separation violations were avoidable: the post-hoc analysis asked about a game, and its answers counted.
 
 `StateLog` keeps what the analysis looks back at: all boats' full states and who drove them, about 0.6 kB a step for six
-boats. Nothing is computed while the game goes on, and nothing at all when it had no breach.
+boats. Nothing is computed while the game goes on, and nothing at all when it had no violation.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from steerclear.env.record import Record, read_meta
 from steerclear.shield.exceptions import ConfigError
 
 from . import oracle
-from .oracle import AT_ONCE, BreachVerdict, Motion, Outcome, Responsible, Verdict
+from .oracle import AT_ONCE, Motion, Outcome, Responsible, Verdict, ViolationVerdict
 from .statistics import count_interval
 
 JUDGE = ("all", "shielded", "none")
 """Whose separation violations are judged: in every game, in games whose own team is shielded, in none."""
 MOST_JUDGED = 500
-"""Breaches of one game beyond this many are not judged."""
+"""Violations of one game beyond this many are not judged."""
 NOT_JUDGED = "not_judged"
 
 
@@ -82,21 +82,23 @@ def judge_game(
     Args:
         log: the game's states.
         params: (n, N_PARAM) parameter rows of its boats.
-        record: the game, with its ``breaches``.
+        record: the game, with its ``violations``.
         side: the team in question.
         motion: the current that carried the boats, and how late their commands came.
 
     Returns:
-        Per breach, in order of time, the entries of ``breaches[]`` in `docs.KEYS`.
+        Per violation, in order of time, the entries of ``violations[]`` in `docs.KEYS`.
     """
     meta = read_meta(record)
     team = np.asarray(meta["team"])
-    found = [row for row in record["breaches"] if side in (team[int(row[1])], team[int(row[2])])]
+    found = [row for row in record["violations"] if side in (team[int(row[1])], team[int(row[2])])]
     if not found:
         return []
     radius_m, dt_s = float(meta["separation_m"]), float(meta["dt_s"])
-    verdicts = oracle.judge_breaches(log.states, params, found[:MOST_JUDGED], radius_m, dt_s, log.driven, motion=motion)
-    padded: list[BreachVerdict | None] = [*verdicts, *[None] * (len(found) - len(verdicts))]
+    verdicts = oracle.judge_violations(
+        log.states, params, found[:MOST_JUDGED], radius_m, dt_s, log.driven, motion=motion
+    )
+    padded: list[ViolationVerdict | None] = [*verdicts, *[None] * (len(found) - len(verdicts))]
     disabled, entries = getattr(log, "disabled", None), []
     for (first, *boats, closest_m), verdict in zip(found, padded, strict=True):
         step, pair = int(first), [int(boat) for boat in boats]
@@ -117,7 +119,7 @@ def judge_game(
 
 
 def _judged(
-    both: BreachVerdict | None, own: Sequence[int], agent_ids: Sequence[str], disabled: np.ndarray | None
+    both: ViolationVerdict | None, own: Sequence[int], agent_ids: Sequence[str], disabled: np.ndarray | None
 ) -> dict[str, Any]:
     if both is None:
         empty = ("last_preventable_s", "other_last_preventable_s", "exhausted", "responsible")
@@ -136,7 +138,7 @@ def _judged(
     }
 
 
-def own_side(both: BreachVerdict, own: Sequence[int]) -> tuple[Verdict, str]:
+def own_side(both: ViolationVerdict, own: Sequence[int]) -> tuple[Verdict, str]:
     """The verdict on the own boat that could act the longest, and who is responsible: one of `SIDES`."""
     ours = [verdict for verdict in (both.first, both.second) if verdict.own in own]
     best = max(ours, key=lambda verdict: -1 if verdict.last_step is None else verdict.last_step)
@@ -160,36 +162,36 @@ SHORT_HEADS = ("", "hits", "game-controlled", "avoid.", "unavoid.", "inside", "u
 """Heads of the terminal's table; game-controlled hits are those, of all, whose own boats the game drove."""
 
 
-def verdict_columns(breaches: Sequence[Row] | None, radius_m: float) -> dict[str, int | None]:
+def verdict_columns(violations: Sequence[Row] | None, radius_m: float) -> dict[str, int | None]:
     """Count a game's verdicts (of `judge_game`; None: it was not judged, and neither is any column).
 
     Returns:
         ``avoidable`` of both kinds, of them ``avoidable_driven`` of boats that the game drove, and a count per outcome
         and kind, such as ``avoidable_opponent_2.5m``.
     """
-    found = [breach for breach in breaches or () if breach["verdict"] == AVOIDABLE]
-    counts = {"avoidable": len(found), "avoidable_driven": sum(bool(breach.get("driven")) for breach in found)}
+    found = [violation for violation in violations or () if violation["verdict"] == AVOIDABLE]
+    counts = {"avoidable": len(found), "avoidable_driven": sum(bool(violation.get("driven")) for violation in found)}
     for kind in KINDS:
         for verdict in _COUNTED:
-            counts[f"{verdict}_{kind}_{float(radius_m)}m"] = _number(breaches or (), kind, verdict)
-    return {name: None if breaches is None else count for name, count in counts.items()}
+            counts[f"{verdict}_{kind}_{float(radius_m)}m"] = _number(violations or (), kind, verdict)
+    return {name: None if violations is None else count for name, count in counts.items()}
 
 
 def summarise_verdicts(rows: Sequence[Row]) -> dict[str, Any]:
-    """Summarise the verdicts of a pairing's games; those without ``breaches`` were not judged.
+    """Summarise the verdicts of a pairing's games; those without ``violations`` were not judged.
 
     Returns:
         Per shield state off, on and, where there are such games, covered: ``games`` and ``games_judged``; per kind the
-        number of violations per outcome, ``breaches``, ``game_controlled`` (those of boats that the game drove),
-        ``avoidable_per_game`` (value, low, high; None when no game was judged) and ``responsible`` (number per side).
+        number of violations per outcome, ``violations``, ``avoidable_per_game`` (value, low, high; None when no game
+        was judged) and ``responsible`` (number per side).
     """
     summary = {}
     for state in STATES:
         games = [row for row in rows if state_of(row) == state]
         if state == COVERED and not games:
             continue
-        judged = [row["breaches"] for row in games if row.get("breaches") is not None]
-        found = [breach for breaches in judged for breach in breaches]
+        judged = [row["violations"] for row in games if row.get("violations") is not None]
+        found = [violation for violations in judged for violation in violations]
         kinds = {kind: _kind(found, kind, len(judged)) for kind in KINDS}
         summary[state] = {"games": len(games), "games_judged": len(judged), **kinds}
     return summary
@@ -200,29 +202,29 @@ def state_of(row: Row) -> str:
     return str(row.get("state") or (ON if row["shielded"] else OFF))
 
 
-def _kind(breaches: Sequence[Row], kind: str, games: int) -> dict[str, Any]:
-    counts = {verdict: _number(breaches, kind, verdict) for verdict in _COUNTED}
-    sides = [breach["responsible"] for breach in breaches if breach["kind"] == kind]
+def _kind(violations: Sequence[Row], kind: str, games: int) -> dict[str, Any]:
+    counts = {verdict: _number(violations, kind, verdict) for verdict in _COUNTED}
+    sides = [violation["responsible"] for violation in violations if violation["kind"] == kind]
     return {
-        "breaches": sum(counts.values()),
-        "game_controlled": sum(breach["kind"] == kind and bool(breach.get("driven")) for breach in breaches),
+        "violations": sum(counts.values()),
+        "game_controlled": sum(violation["kind"] == kind and bool(violation.get("driven")) for violation in violations),
         **counts,
         "avoidable_per_game": asdict(count_interval(counts["avoidable"], games)) if games else None,
         "responsible": {side: sides.count(side) for side in SIDES},
     }
 
 
-def _number(breaches: Sequence[Row], kind: str, verdict: str) -> int:
-    return sum(breach["kind"] == kind and breach["verdict"] == verdict for breach in breaches)
+def _number(violations: Sequence[Row], kind: str, verdict: str) -> int:
+    return sum(violation["kind"] == kind and violation["verdict"] == verdict for violation in violations)
 
 
-def all_breaches(rows: Sequence[Row]) -> list[dict[str, Any]]:
+def all_violations(rows: Sequence[Row]) -> list[dict[str, Any]]:
     """List the separation violations of all judged games, each with the game it happened in."""
     named = ("pairing", "game", "shielded")
     return [
-        {**{name: row[name] for name in named}, "state": state_of(row), **breach}
+        {**{name: row[name] for name in named}, "state": state_of(row), **violation}
         for row in rows
-        for breach in row.get("breaches") or ()
+        for violation in row.get("violations") or ()
     ]
 
 
@@ -235,7 +237,7 @@ def verdict_rows(verdicts: Mapping[str, Any], interval_text: Any) -> list[list[s
             told = ["not judged", *["-"] * (len(HEADS) - 2)]
             if part["games_judged"]:
                 counts = part[kind]
-                told = [str(counts.get(name, "-")) for name in ("breaches", "game_controlled", *_COUNTED)]
+                told = [str(counts.get(name, "-")) for name in ("violations", "game_controlled", *_COUNTED)]
                 told.append(interval_text(counts["avoidable_per_game"]))
             lines.append([f"{kind}, {state}", *told])
     return lines

@@ -33,11 +33,11 @@ def compile_judge() -> None:
     oracle.judge(states, [boat, boat], own=0, step=13, radius_m=2.5)
 
 
-def compile_encounters(guard: str = "shield", judge: bool = True) -> None:
+def compile_encounters(safety_filter: str = "shield", judge: bool = True) -> None:
     """Compile what encounters with a filter need."""
     from .encounters import measure
 
-    measure("rammer_1", guard, n=1, judge=judge)
+    measure("rammer_1", safety_filter, n=1, judge=judge)
 
 
 PARTS: dict[str, Callable[[], object]] = {

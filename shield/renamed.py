@@ -47,7 +47,11 @@ DECISIONS = {
     "feared_s": "adversary_horizon_s",
 }
 """Fields of `Fleet`, `Decision` and `Decisions`."""
+KEYS = {"wanted": "nominal", "sent": "filtered", "guard": "filter", "guards": "filters"}
+KEY_PARTS = {"breaches": "violations", "breached": "violated", "start_certificate_m": "start_safety_margin_m"}
+"""Keys of records and result files; parts of keys."""
 
+_OLD_KEYS = {new: old for old, new in KEYS.items() if old.startswith("guard")}
 T = TypeVar("T", bound=type)
 F = TypeVar("F", bound=Callable[..., Any])
 LOG = logging.getLogger(__name__)
@@ -74,6 +78,66 @@ def warn(old: str, new: str, stacklevel: int = 3) -> None:
     """Warn that a name is deprecated, with its new name."""
     text = f"{old!r} is now {new!r}; the old name goes with the next release"
     warnings.warn(text, DeprecationWarning, stacklevel=stacklevel + 1)
+
+
+def current_key(key: str) -> str:
+    """Return the present name of a key of a record or result file of an earlier version."""
+    for old, new in KEY_PARTS.items():
+        key = key.replace(old, new)
+    return KEYS.get(key, key)
+
+
+def current_keys(content: Any) -> Any:
+    """Return nested data of a result file of an earlier version under present keys."""
+    if isinstance(content, Mapping):
+        return {current_key(key): current_keys(value) for key, value in content.items()}
+    return [current_keys(value) for value in content] if isinstance(content, list) else content
+
+
+def earlier_keys(content: Any) -> Any:
+    """Return the part of nested results whose keys were renamed, under the earlier keys; empty: there is none."""
+    if isinstance(content, list | tuple):
+        parts = [earlier_keys(value) for value in content]
+        return parts if any(parts) else []
+    if not isinstance(content, Mapping):
+        return {}
+    found = {}
+    for key, value in content.items():
+        old = _OLD_KEYS.get(key, str(key))
+        for part, now in KEY_PARTS.items():
+            old = old.replace(now, part)
+        inside = value if old != key else earlier_keys(value)
+        if old != key or inside:
+            found[old] = inside
+    return found
+
+
+def old_names(module: Mapping[str, Any], names: Mapping[str, str]) -> Callable[[str], Any]:
+    """Return a module's ``__getattr__`` that answers to old names, with a warning.
+
+    Args:
+        module: the module's ``globals()``.
+        names: old name to new.
+    """
+
+    def read(name: str) -> Any:
+        if name not in names:
+            raise AttributeError(f"module {module['__name__']!r} has no attribute {name!r}")
+        warn(name, names[name], stacklevel=2)
+        return module[names[name]]
+
+    return read
+
+
+class Renamed(dict[str, Any]):
+    """A dict that also answers to keys of an earlier version, with a warning."""
+
+    def __missing__(self, key: str) -> Any:
+        new = current_key(key)
+        if new == key:
+            raise KeyError(key)
+        warn(key, new, stacklevel=2)
+        return self[new]
 
 
 def takes_old_keywords(keywords: Mapping[str, str]) -> Callable[[F], F]:

@@ -178,8 +178,9 @@ class Shield:
         self._barriers.renew()
         deciders.decide(self._keep_from(static, deciders.scene))
         self._barriers.tell()
-        sent, changed, reason, reported = (values[place] for values in self._decided(deciders.scene))
-        commands = within.replaced(changed, sent, fleet.state[:, L.HEADING]) if changed.any() else within
+        sent, changed, reason, reported = self._decided(deciders.scene)
+        changed, reason = changed[place], reason[place]
+        commands = within.replaced(changed, sent[place], fleet.state[:, L.HEADING]) if changed.any() else within
         if cut is not None:
             reason[cut & (reason == W.PASSED)] = W.LIMITED
             changed |= cut
@@ -197,7 +198,7 @@ class Shield:
             no_table=self._missing,
             barriers=self.config.barriers,
             area=around.field,
-            **self._as_fields(reported),
+            **self._as_fields(reported[place]),
         )
 
     def _as_fields(self, reported: Array) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
 from steerclear.env.config import GameConfig
-from steerclear.env.record import find_breaches, make_record, meta_of
+from steerclear.env.record import find_violations, make_record, meta_of
 
 settings.register_profile("shared_machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("shared_machine")  # how long an example takes says more of the machine than of the code
@@ -98,7 +98,7 @@ def game_meta():
 
 @pytest.fixture
 def game_record(game_meta):
-    """A made-up game of 60 steps with two changed stretches, a held boat, a capture and a breach of boats 0 and 2."""
+    """A made-up game of 60 steps with two changed stretches, a held boat, a capture, and boats 0 and 2 too near."""
     return synthetic_record(game_meta, steps=60)
 
 
@@ -138,5 +138,5 @@ def synthetic_record(meta, steps, seed=3):
         reason=reason,
         intervened=intervened,
         safety_margin_m=certificate,
-        breaches=find_breaches(position, meta["separation_m"]),
+        violations=find_violations(position, meta["separation_m"]),
     )

@@ -17,6 +17,8 @@ def _paths(content, path=""):
     """Yield the path of every value: ``a.b[].c``."""
     if isinstance(content, dict) and content:
         for name, value in content.items():
+            if name == "deprecated" and not path:  # earlier names
+                continue
             yield from _paths(value, f"{path}.{name}" if path else str(name))
     elif isinstance(content, list | tuple) and content:
         for value in content:
@@ -26,7 +28,7 @@ def _paths(content, path=""):
 
 
 def _pattern(name):
-    # settings may nest; elsewhere a star is one name (which may hold a dot, as in breaches_opponent_2.5m)
+    # settings may nest; elsewhere a star is one name (which may hold a dot, as in violations_opponent_2.5m)
     if name.endswith("settings.*"):
         return re.escape(name[:-1]) + ".+"
     return re.escape(name).replace(r"\*", r"[^\[\]]+?")

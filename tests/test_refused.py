@@ -12,7 +12,7 @@ from steerclear.env.core import BatchedMctf
 from steerclear.env.field import field_geometry
 from steerclear.env.mctf import MctfEnv
 from steerclear.env.pyquaticus_config import from_pyquaticus
-from steerclear.env.record import GameRecorder, find_breaches
+from steerclear.env.record import GameRecorder, find_violations
 from steerclear.env.render import Renderer
 from steerclear.shield import Commands, Fleet, Reason, Shield, ShieldConfig, Surroundings, exceptions
 from steerclear.shield.barriers import Barrier
@@ -109,7 +109,7 @@ CALLED = (
         Surroundings,
         TeamBatch,
         as_config,
-        find_breaches,
+        find_violations,
         games_shield,
         get_platform,
         parse_platform,

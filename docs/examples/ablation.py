@@ -17,6 +17,6 @@ off = MatchSpec("aamas2024", own="medium", opponent="rammer", rules={"max_time_s
 on = replace(off, shield={"profile": "ramming"})
 for name, spec in (("off", off), ("on", on)):
     games = [play_match(replace(spec, game=k, seed=k)) for k in range(GAMES)]
-    hits = sum(game.row["breaches_opponent_2.5m"] + game.row["breaches_teammate_2.5m"] for game in games)
+    hits = sum(game.row["violations_opponent_2.5m"] + game.row["violations_teammate_2.5m"] for game in games)
     speed = sum(mean_speed_mps(game.record) for game in games) / GAMES
     print(f"shield {name}: {hits} hits at 2.5 m in {GAMES} games, mean speed {speed:.2f} m/s")

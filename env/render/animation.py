@@ -146,7 +146,7 @@ def _write_gif(path: Path, frames: Iterator[np.ndarray], picture: Picture, fps: 
 def _palette(picture: Picture) -> list[int]:
     """Return 256 colours: the theme's, the most frequent of the still field, and steps between marks and water."""
     theme = picture.theme
-    marks = [*theme.team, theme.ink, theme.muted, theme.wanted, theme.changed, theme.breach]
+    marks = [*theme.team, theme.ink, theme.muted, theme.nominal, theme.changed, theme.violation]
     grounds = [*theme.water, theme.page, theme.plate]
     colours = [*marks, *grounds, theme.grid, theme.edge, theme.obstacle]
     seen, counts = np.unique(pixels(picture.still()).reshape(-1, 3), axis=0, return_counts=True)

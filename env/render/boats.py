@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from steerclear.env.render.canvas import Canvas, Colour, Theme, mix
-from steerclear.env.render.scene import Arena, Pair, Scene, boats_in_breach, closest_pair
+from steerclear.env.render.scene import Arena, Pair, Scene, boats_in_violation, closest_pair
 
 LOOKAHEAD_S = 4.0
 """Commands and speeds are drawn as the distance covered in this time."""
@@ -104,7 +104,7 @@ def draw_boats(canvas: Canvas, scene: Scene, arena: Arena, theme: Theme, show_co
     _draw_separation(canvas, scene, arena, theme)
     pair = closest_pair(scene, arena)
     if pair is not None and pair[2] <= CLOSE_SEPARATIONS * arena.separation_m:
-        colour = theme.breach if pair[2] <= arena.separation_m else theme.muted
+        colour = theme.violation if pair[2] <= arena.separation_m else theme.muted
         canvas.dashed_line(scene.position_m[pair[0]], scene.position_m[pair[1]], colour, 1.4, 3)
     for team, home in enumerate(arena.flag_home_m):
         canvas.disc(home, 0.35, theme.team[team], 0.5)
@@ -123,15 +123,15 @@ def _draw_separation(canvas: Canvas, scene: Scene, arena: Arena, theme: Theme) -
     If any boat is shielded, only violations that involve a shielded boat are marked.
     """
     covered = {boat for boat, name in enumerate(arena.names) if name in arena.shielded}
-    pairs = boats_in_breach(scene, arena.separation_m)
-    breached = {boat for pair in pairs if not covered or covered & set(pair) for boat in pair}
+    pairs = boats_in_violation(scene, arena.separation_m)
+    violated = {boat for pair in pairs if not covered or covered & set(pair) for boat in pair}
     radius_m = arena.separation_m / 2
     for boat, centre in enumerate(scene.position_m):
         colour, strength, width = theme.team[arena.team[boat]], 0.10, 1.0
         if scene.overlay is not None and scene.overlay.intervened[boat]:
             colour, strength, width = theme.changed, 0.28, 1.8
-        if boat in breached:
-            colour, strength, width = theme.breach, 0.35, 2.4
+        if boat in violated:
+            colour, strength, width = theme.violation, 0.35, 2.4
         canvas.disc(centre, radius_m, colour, strength)
         canvas.ring(centre, radius_m, colour, width, 0.9 if strength > 0.2 else 0.55)
 
@@ -151,12 +151,12 @@ def command_end(start_m: np.ndarray, command: np.ndarray) -> np.ndarray:
 def _draw_command(canvas: Canvas, scene: Scene, boat: int, arena: Arena, theme: Theme) -> None:
     overlay, start = scene.overlay, scene.position_m[boat]
     assert overlay is not None
-    sent_end = command_end(start, overlay.sent[boat])
+    filtered_end = command_end(start, overlay.filtered[boat])
     if not overlay.intervened[boat]:
-        canvas.arrow(start, sent_end, mix(theme.team[arena.team[boat]], theme.page, 0.25), 1.6)
+        canvas.arrow(start, filtered_end, mix(theme.team[arena.team[boat]], theme.page, 0.25), 1.6)
         return
-    canvas.arrow(start, command_end(start, overlay.wanted[boat]), theme.wanted, 1.6)
-    canvas.arrow(start, sent_end, theme.changed, 4.6, theme.plate)
+    canvas.arrow(start, command_end(start, overlay.nominal[boat]), theme.nominal, 1.6)
+    canvas.arrow(start, filtered_end, theme.changed, 4.6, theme.plate)
 
 
 def _draw_hull(canvas: Canvas, scene: Scene, boat: int, arena: Arena, theme: Theme) -> None:

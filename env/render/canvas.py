@@ -32,9 +32,9 @@ class Theme:
     ink: Colour  # Text and strong marks
     muted: Colour  # Secondary text
     team: tuple[Colour, Colour]  # Team 0 and team 1
-    wanted: Colour  # Arrow of a nominal command that the shield replaced
+    nominal: Colour  # Arrow of a nominal command that the shield replaced
     changed: Colour  # Arrow and halo of a command the shield changed
-    breach: Colour  # Two boats that violate the separation
+    violation: Colour  # Two boats that violate the separation
     obstacle: Colour  # Fixed obstacles
     plate: Colour  # Behind labels
 
@@ -48,9 +48,9 @@ THEMES = {
         ink=(15, 23, 42),
         muted=(84, 98, 118),
         team=((29, 92, 208), (206, 58, 48)),
-        wanted=(71, 85, 105),
+        nominal=(71, 85, 105),
         changed=(240, 130, 0),
-        breach=(190, 24, 147),
+        violation=(190, 24, 147),
         obstacle=(120, 113, 108),
         plate=(255, 255, 255),
     ),
@@ -62,9 +62,9 @@ THEMES = {
         ink=(236, 242, 250),
         muted=(148, 163, 184),
         team=((86, 156, 255), (255, 108, 96)),
-        wanted=(190, 202, 220),
+        nominal=(190, 202, 220),
         changed=(255, 171, 46),
-        breach=(255, 92, 214),
+        violation=(255, 92, 214),
         obstacle=(148, 140, 132),
         plate=(20, 30, 48),
     ),

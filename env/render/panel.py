@@ -58,7 +58,7 @@ def draw_header(surface: pygame.Surface, scene: Scene, arena: Arena, theme: Them
     draw_text(surface, clock, (width / 2, middle - 9), theme.ink, 27, True, "center")
     pair = closest_pair(scene, arena)
     line = _joined(arena.title, "" if pair is None else f"closest pair {pair[2]:.1f} m")
-    colour = theme.breach if pair is not None and pair[2] <= arena.separation_m else theme.muted
+    colour = theme.violation if pair is not None and pair[2] <= arena.separation_m else theme.muted
     draw_text(surface, line, (width / 2, middle + 17), colour, anchor="center")
 
 
@@ -72,10 +72,10 @@ def draw_legend(surface: pygame.Surface, arena: Arena, theme: Theme) -> None:
     if arena.steered:
         x = draw_text(surface, STEERING, (x, y), theme.ink, bold=True).right + 26
     entries = (
-        ("arrow", theme.wanted, 2, "nominal command"),
+        ("arrow", theme.nominal, 2, "nominal command"),
         ("arrow", theme.changed, 5, "filtered command"),
         ("ring", theme.muted, 2, f"discs touch = closer than {arena.separation_m:g} m"),
-        ("ring", theme.breach, 3, "separation violation"),
+        ("ring", theme.violation, 3, "separation violation"),
         ("cross", theme.ink, 2, "tagged"),
     )
     for kind, colour, width, text in entries:
@@ -172,7 +172,7 @@ def draw_labels(surface: pygame.Surface, canvas: Canvas, scene: Scene, arena: Ar
     if pair is not None and pair[2] <= CLOSE_SEPARATIONS * arena.separation_m:
         middle = canvas.to_px((scene.position_m[pair[0]] + scene.position_m[pair[1]]) / 2)
         inside = pair[2] <= arena.separation_m
-        colours = (theme.plate, theme.breach, theme.breach) if inside else (theme.muted, theme.muted, theme.plate)
+        colours = (theme.plate, theme.violation, theme.violation) if inside else (theme.muted, theme.muted, theme.plate)
         labels.plate(f"{pair[2]:.1f} m", middle, 4.0, *colours)
     changed = np.zeros(len(spots), bool) if scene.overlay is None else np.asarray(scene.overlay.intervened)
     for boat in np.argsort(~changed, kind="stable").tolist():
@@ -192,7 +192,7 @@ def _marks_to_clear(canvas: Canvas, scene: Scene) -> list[pygame.Rect]:
         return boxes
     for boat in np.flatnonzero(scene.overlay.intervened):
         start = scene.position_m[boat]
-        for command in (scene.overlay.wanted[boat], scene.overlay.sent[boat]):
+        for command in (scene.overlay.nominal[boat], scene.overlay.filtered[boat]):
             way = command_end(start, command) - start
             boxes += [_around(canvas.to_px(start + share * way), 6.0) for share in np.linspace(0.1, 1.0, 10)]
     return boxes

@@ -130,17 +130,17 @@ def _obstacles(entries: Mapping[str, Any]) -> tuple[Obstacle, ...]:
 class Overlay:
     """Nominal commands of n boats and the shield's decisions on them."""
 
-    wanted: np.ndarray  # (n, 2) nominal speed m/s and absolute heading deg
-    sent: np.ndarray  # (n, 2) likewise, the commands that the boats received
+    nominal: np.ndarray  # (n, 2) nominal speed m/s and absolute heading deg
+    filtered: np.ndarray  # (n, 2) likewise, the commands that the boats received
     reason: np.ndarray  # (n,) shield reason codes
     intervened: np.ndarray  # (n,) bool
     safety_margin_m: np.ndarray  # (n,) NaN where there is none
 
     @classmethod
-    def of_commands(cls, wanted: np.ndarray, sent: np.ndarray) -> Overlay:
+    def of_commands(cls, nominal: np.ndarray, filtered: np.ndarray) -> Overlay:
         """Build an overlay from commands (n, 2) alone; those that differ count as changed."""
-        changed = np.any(np.not_equal(wanted, sent), axis=1)
-        return cls(wanted, sent, np.full(len(changed), NOT_COVERED), changed, np.full(len(changed), np.nan))
+        changed = np.any(np.not_equal(nominal, filtered), axis=1)
+        return cls(nominal, filtered, np.full(len(changed), NOT_COVERED), changed, np.full(len(changed), np.nan))
 
 
 _OF_BOATS = ("has_flag", "is_tagged", "oob")
@@ -208,7 +208,7 @@ def closest_pair(scene: Scene, arena: Arena) -> tuple[int, int, float] | None:
     return int(first), int(second), float(gap_m[first, second])
 
 
-def boats_in_breach(scene: Scene, separation_m: float) -> list[tuple[int, int]]:
+def boats_in_violation(scene: Scene, separation_m: float) -> list[tuple[int, int]]:
     """List the pairs of boats within the separation radius."""
     first, second = np.nonzero(_gaps_m(scene) <= separation_m)
     return list(zip(first.tolist(), second.tolist(), strict=True))

@@ -152,15 +152,15 @@ def split_name(name: str) -> tuple[str, dict[str, Any]]:
     return base, settings
 
 
-def build_filter(guard: str | FilterMaker, scenes: Scenes, conditions: Conditions) -> SafetyFilter:
+def build_filter(safety_filter: str | FilterMaker, scenes: Scenes, conditions: Conditions) -> SafetyFilter:
     """Build the filter with a name, or call a maker, for a batch of scenes; conditions become settings.
 
     Raises:
         ConfigError: an unknown name, or a filter that cannot honour the conditions.
     """
-    base, settings = split_name(guard) if isinstance(guard, str) else ("", {})
-    if isinstance(guard, str):
-        check_filter(guard)
+    base, settings = split_name(safety_filter) if isinstance(safety_filter, str) else ("", {})
+    if isinstance(safety_filter, str):
+        check_filter(safety_filter)
     config = ShieldConfig.of(
         separation_m=conditions.radius_m,
         position_error_m=conditions.noise_m,
@@ -171,4 +171,4 @@ def build_filter(guard: str | FilterMaker, scenes: Scenes, conditions: Condition
     )
     around = OPEN_WATER if scenes.field is None else Surroundings(field=scenes.field)
     fleet = (config, scenes.games, scenes.platforms, tuple(scenes.team.tolist()), around)
-    return guard(*fleet) if callable(guard) else FILTERS[base].make(*fleet, settings)
+    return safety_filter(*fleet) if callable(safety_filter) else FILTERS[base].make(*fleet, settings)

@@ -24,7 +24,7 @@ def cost(name: str, platform: str, gains: Gains, n: int = 60, seed: int = 20_260
         return TextbookFilter(name, config, games, platforms, team, gains)
 
     figures = [measure(one, make, platform, platform, n, seed, judge=False).summary for one in FAMILIES]
-    return sum(one["breached"] for one in figures), sum(one["changed_percent"] for one in figures)
+    return sum(one["violated"] for one in figures), sum(one["changed_percent"] for one in figures)
 
 
 def best(name: str, platform: str) -> Gains:

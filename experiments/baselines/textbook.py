@@ -12,8 +12,7 @@ With velocities as inputs, and v_j of a boat that is not own, it reads <dh/dp, z
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
-from warnings import warn
+from typing import NamedTuple
 
 import numpy as np
 from steerclear.shield.config import ShieldConfig
@@ -22,6 +21,7 @@ from steerclear.shield.jit import Array, BoolArray, IntArray, kernel
 from steerclear.shield.platforms import Platform
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.usv import clamp, wrap_degrees
+from steerclear.shield.renamed import old_names
 
 from .barriers import BARRIERS, Barrier, Gains, dot
 from .base import BatchFilter, Games, game_of
@@ -203,8 +203,4 @@ def decide_games(setup: Setup, games: Games, acts: Array, need: Array) -> None:
         decide_game(setup, game_of(games, b), acts[b], need[b])
 
 
-def __getattr__(name: str) -> Any:
-    if name != "TextbookGuard":
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    warn("TextbookGuard is called TextbookFilter", DeprecationWarning, stacklevel=2)
-    return TextbookFilter
+__getattr__ = old_names(globals(), {"TextbookGuard": "TextbookFilter"})

@@ -120,15 +120,15 @@ def judge(replay: Replay) -> None:
         return
     side = min(int(tracks.team[tracks.ours].min(initial=1)), 1)
     seen: Any = SimpleNamespace(states=placed(tracks.states), driven=tracks.marked("driven"))
-    breaches = judge_game(seen, tracks.params, record, side)
+    violations = judge_game(seen, tracks.params, record, side)
     distances = PairDistances.of(placed(tracks.states)[:, :, :2])
     for kind, wanted in (("teammate", 2), ("opponent", 1)):
         columns = [c for c, pair in enumerate(distances.pairs) if tracks.ours[list(pair)].sum() == wanted]
         gaps = distances.distance_m[:, columns]
         near = gaps[gaps < 1e5]
         replay.judged[f"closest_{kind}_m"] = float(near.min()) if near.size else None
-        replay.judged[f"breaches_{kind}"] = sum(breach["kind"] == kind for breach in breaches)
-    replay.judged["breaches"] = breaches
+        replay.judged[f"violations_{kind}"] = sum(violation["kind"] == kind for violation in violations)
+    replay.judged["violations"] = violations
 
 
 def as_content(replay: Replay) -> dict[str, Any]:
@@ -247,20 +247,20 @@ def _tables(replay: Replay) -> Iterator[RenderableType]:
     for key, name in (
         ("closest_teammate_m", "closest teammate, m"),
         ("closest_opponent_m", "closest other boat, m"),
-        ("breaches_teammate", "breaches with teammates"),
-        ("breaches_opponent", "breaches with others"),
+        ("violations_teammate", "violations with teammates"),
+        ("violations_opponent", "violations with others"),
     ):
         table.add_row(name, _number(replay.judged[key]))
     yield table
-    if breaches := replay.judged["breaches"]:
-        title = f"Breaches of {replay.header.config.separation_m:g} m"
+    if violations := replay.judged["violations"]:
+        title = f"Violations of {replay.header.config.separation_m:g} m"
         heads = ("time, s", "boats", "closest, m", "verdict", "last chance, s before", "responsible")
         table = Table(*heads, title=title, title_justify="left")
-        for entry in breaches[:MOST_ROWS]:
+        for entry in violations[:MOST_ROWS]:
             row = [f"{entry['time_s']:.1f}", ", ".join(entry["boats"]), f"{entry['closest_m']:.2f}"]
             table.add_row(*row, entry["verdict"], _number(entry["last_preventable_s"]), entry["responsible"] or "-")
         yield table
-        yield from _rest(len(breaches))
+        yield from _rest(len(violations))
 
 
 def _number(value: Any) -> str:

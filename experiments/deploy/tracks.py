@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from steerclear.env.config import GameConfig
-from steerclear.env.record import Record, find_breaches, make_record
+from steerclear.env.record import Record, find_violations, make_record
 from steerclear.shield.bridge.blackbox import LogHeader
 from steerclear.shield.bridge.messages import Tick
 from steerclear.shield.bridge.tracker import GHOST
@@ -27,7 +27,7 @@ MOST_STEPS = 10_000_000  # longest plausible log in steps, over ten days at 10 H
 _MATCH_S = 1e-6
 _SEEN = L.SPEED + 1
 _DECIDED = np.dtype(
-    [("wanted", "f8", 2), ("sent", "f8", 2), ("reason", "i8"), ("intervened", "?"), ("safety_margin_m", "f8")]
+    [("nominal", "f8", 2), ("filtered", "f8", 2), ("reason", "i8"), ("intervened", "?"), ("safety_margin_m", "f8")]
 )
 """Decision for one boat at one tick."""
 _NOTHING = ((math.nan, math.nan), (math.nan, math.nan), int(Reason.NOT_COVERED), False, math.nan)
@@ -45,8 +45,8 @@ class Tracks:
     time_s: Array  # (T+1,) since the log began, s
     states: Array  # (T+1, n, N_STATE) with estimated controller memory; NaN where a boat was absent
     # nominal and filtered command (T, n, 2): speed m/s and absolute heading rad in [0, 2 pi); NaN: nothing was decided
-    wanted: Array
-    sent: Array
+    nominal: Array
+    filtered: Array
     reason: NDArray[np.int64]  # (T, n); NOT_COVERED where nothing was decided
     intervened: NDArray[np.bool_]  # (T, n) bool
     safety_margin_m: Array  # (T, n); NaN where nothing was decided
@@ -194,12 +194,12 @@ def record_of(header: LogHeader, tracks: Tracks) -> Record:
         **{array: tracks.marked(key)[[*range(len(tracks.games)), -1]] for array, key in marks.items()},
         flag_position=np.array([_flags(game) for game in last], dtype=np.float64),
         captures=np.array([_captures(game) for game in last], dtype=np.int64),
-        nominal=_in_degrees(tracks.wanted),
-        filtered=_in_degrees(tracks.sent),
+        nominal=_in_degrees(tracks.nominal),
+        filtered=_in_degrees(tracks.filtered),
         reason=tracks.reason,
         intervened=tracks.intervened,
         safety_margin_m=tracks.safety_margin_m,
-        breaches=find_breaches(placed(tracks.states)[:, :, : L.Y + 1], header.config.separation_m),
+        violations=find_violations(placed(tracks.states)[:, :, : L.Y + 1], header.config.separation_m),
     )
 
 

@@ -5,15 +5,14 @@ From Python::
     from steerclear.experiments.encounters import Conditions, measure
     outcome = measure("rammer_1", "shield:adversary_horizon_s=9", own="heron", other="heron", n=200, seed=0,
                       conditions=Conditions(radius_m=2.5))
-    outcome.summary["breached"], outcome.columns["closest_m"].min()
+    outcome.summary["violated"], outcome.columns["closest_m"].min()
 
 ``draw`` gives the scenes alone, ``play`` plays them with any safety filter and returns every state. A filter decides
 in water and in the dark as the batched shield does: ``decide(state, nominal, ours) -> filtered``, ``reason``,
 ``safety_margin_m``.
 """
 
-from typing import Any
-from warnings import warn
+from steerclear.shield.renamed import old_names
 
 from ..baselines.registry import build_filter, parse_filters
 from .figures import Outcome, measure
@@ -36,10 +35,4 @@ __all__ = [
     "play",
 ]
 _OLD = {"Film": "Trajectory", "build_guard": "build_filter", "parse_guards": "parse_filters"}
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _OLD:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    warn(f"{name} is called {_OLD[name]}", DeprecationWarning, stacklevel=2)
-    return globals()[_OLD[name]]
+__getattr__ = old_names(globals(), _OLD)

@@ -33,7 +33,7 @@ from ..warming import compile_encounters, compile_judge
 from ..workers import Job, Row
 from . import scene as S
 from .builder import SceneBuilder, ahead
-from .outcomes import Columns, judge_game, side_name, start_certificate_m, tally
+from .outcomes import Columns, judge_game, side_name, start_safety_margin_m, tally
 from .replay import records_with_and_without
 from .scenarios import scenes_of_builds
 from .scene import Conditions, Scenes, scene_content, scenes_of
@@ -62,7 +62,7 @@ class Search:
     other: str = "heron"
     attackers: int = 1
     own_boats: int = 1
-    guard: str = "shield"
+    filter: str = "shield"
     conditions: Conditions = field(default_factory=Conditions)
     seed: int = 0
     restart: int = 0
@@ -70,7 +70,7 @@ class Search:
     generations: int = 30
 
     def __post_init__(self) -> None:
-        check_filter(self.guard)
+        check_filter(self.filter)
         check_count("--attackers", self.attackers, 1, MOST_ATTACKERS)
         check_count("--own", self.own_boats, 1, MOST_OWN)
         check_count("--population", self.population, 8, MOST_PLAYED)
@@ -92,7 +92,7 @@ class Hunt:
         build.settle()
         self.build, self.best_m, self.point = build, np.inf, np.zeros(self.genes)
         self.history: list[float] = []
-        self.tried = self.breached = 0
+        self.tried = self.violated = 0
         self.judged: list[dict[str, Any]] = []
         self.avoidable: dict[str, Any] | None = None
 
@@ -122,7 +122,7 @@ class Hunt:
 
     def merits(self, points: Array) -> Array:
         """What is minimised, of a generation (genes, S): closest distance, m, or more where a hit is no success."""
-        played = play(self.scenes(points.T), self.search.guard, self.search.conditions)
+        played = play(self.scenes(points.T), self.search.filter, self.search.conditions)
         columns = tally(played)
         merits = columns["closest_m"].copy()
         best = int(merits.argmin())
@@ -135,19 +135,19 @@ class Hunt:
 
     def _judge(self, played: Trajectory, columns: Columns) -> list[int]:
         """Judge the worst of a generation until one is avoidable; the games in which none was."""
-        hits, vain = columns["breaches_teammate"] + columns["breaches_opponent"], []
-        self.breached += int((hits > 0).sum())
+        hits, vain = columns["violations_teammate"] + columns["violations_opponent"], []
+        self.violated += int((hits > 0).sum())
         for game in np.argsort(columns["closest_m"])[:MOST_JUDGED].tolist():
             if hits[game] == 0 or self.avoidable is not None:
                 break
             found = judge_game(played, game)
-            entry: dict[str, Any] = {"closest_m": float(columns["closest_m"][game]), "breaches": int(hits[game])}
+            entry: dict[str, Any] = {"closest_m": float(columns["closest_m"][game]), "violations": int(hits[game])}
             entry |= found | {"responsible": side_name(found["responsible"])}
-            entry |= {"start_certificate_m": float(start_certificate_m(played)[game])}
+            entry |= {"start_safety_margin_m": float(start_safety_margin_m(played)[game])}
             self.judged.append(entry)
             if found["avoidable"]:
                 scene = played.scenes.take([game])
-                self.avoidable = scene_content(scene, played.conditions, guard=self.search.guard, **entry)
+                self.avoidable = scene_content(scene, played.conditions, filter=self.search.filter, **entry)
             else:
                 vain.append(game)
         return vain
@@ -158,7 +158,7 @@ def run_search(search: Search) -> dict[str, Any]:
 
     Returns:
         JSON-ready: ``closest_m`` (least distance of all), ``history`` (best so far per generation), ``tried`` and
-        ``breached`` opponents, ``judged`` violations, ``scene`` (the one with an avoidable one, else None) and
+        ``violated`` opponents, ``judged`` violations, ``scene`` (the one with an avoidable one, else None) and
         ``closest_scene``.
     """
     hunt = Hunt(search)
@@ -182,8 +182,8 @@ def run_search(search: Search) -> dict[str, Any]:
         rng=random,
         callback=lambda intermediate_result: hunt.avoidable is not None,
     )
-    closest = scene_content(hunt.scenes(hunt.point[None]), search.conditions, guard=search.guard)
-    found = {name: getattr(hunt, name) for name in ("history", "tried", "breached", "judged")}
+    closest = scene_content(hunt.scenes(hunt.point[None]), search.conditions, filter=search.filter)
+    found = {name: getattr(hunt, name) for name in ("history", "tried", "violated", "judged")}
     head = {"restart": search.restart, "closest_m": hunt.best_m}
     return {**head, **found, "scene": hunt.avoidable, "closest_scene": closest}
 
@@ -214,11 +214,13 @@ def write_all(run: Run) -> dict[str, Any]:
             write_json(run.folder / row["scene"], entry["scene"])
         rows.append(row)
     if run.rows and not run.interrupted:
-        records, guard = [], run.experiment.settings["guard"]
+        records, safety_filter = [], run.experiment.settings["filter"]
         for entry in sorted(run.rows, key=lambda one: (one["scene"] is None, one["closest_m"]))[:MOST_REPLAYS]:
             scenes, conditions = scenes_of(entry["scene"] or entry["closest_scene"])
-            words = "avoidable breach" if entry["scene"] else f"closest {entry['closest_m']:.2f} m"
-            records += records_with_and_without(scenes, guard, conditions, f"search {entry['restart']}, {words}")
+            words = "avoidable violation" if entry["scene"] else f"closest {entry['closest_m']:.2f} m"
+            records += records_with_and_without(
+                scenes, safety_filter, conditions, f"search {entry['restart']}, {words}"
+            )
         files["replay"] = write_replay(records, run.folder / "replay.html", title="Attacks").name
     results = {
         **run.head(),
@@ -239,18 +241,18 @@ def searches_table(results: dict[str, Any]) -> Group:
         [
             *(f"{row[name]}" for name in ("restart", "tried")),
             number_text(row["closest_m"]),
-            *(f"{number}" for number in (row["breached"], len(row["judged"]))),
+            *(f"{number}" for number in (row["violated"], len(row["judged"]))),
             row["scene"] or "-",
         ]
         for row in results["searches"]
     ]
-    heads = ["search", "tried", "closest, m", "breached", "judged", "avoidable"]
-    return titled(f"{fleet}, filter {settings['guard']}", heads, rows)
+    heads = ["search", "tried", "closest, m", "hits", "judged", "avoidable"]
+    return titled(f"{fleet}, filter {settings['filter']}", heads, rows)
 
 
 def passed(results: dict[str, Any]) -> bool:
     """Whether no shield was hit avoidably."""
-    return not (results["found"] and is_shield(results["settings"]["guard"]))
+    return not (results["found"] and is_shield(results["settings"]["filter"]))
 
 
 KEYS = {
@@ -259,7 +261,7 @@ KEYS = {
     "searches[].closest_m": "least distance that any of its opponents came to an own boat, m",
     "searches[].history[]": "the least distance after each generation, m",
     "searches[].tried": "opponents played",
-    "searches[].breached": "of those, how many got within the radius",
+    "searches[].violated": "of those, how many got within the radius",
     "searches[].judged[].*": "violations the analysis judged: distance, entries, safety margin at the start, verdicts",
     "searches[].scene": "file with the avoidable violation found; null without one",
     "failed[].*": "search that could not be run, and why",

@@ -24,13 +24,13 @@ class Marks:
 
     def __init__(self, c: Columns) -> None:
         self.any = np.ones(len(c["closest_m"]), np.bool_)
-        self.breached = (c["breaches_teammate"] + c["breaches_opponent"]) > 0
-        self.bare_breached = (c["unshielded_breaches_teammate"] + c["unshielded_breaches_opponent"]) > 0
+        self.violated = (c["violations_teammate"] + c["violations_opponent"]) > 0
+        self.bare_violated = (c["unshielded_violations_teammate"] + c["unshielded_violations_opponent"]) > 0
         self.avoidable = c["avoidable"] > 0
-        self.not_judged = self.breached & (c["not_judged"] > 0) & ~self.avoidable
-        settled = self.breached & ~self.avoidable & ~self.not_judged
+        self.not_judged = self.violated & (c["not_judged"] > 0) & ~self.avoidable
+        settled = self.violated & ~self.avoidable & ~self.not_judged
         self.unavoidable, self.inside = settled & (c["unavoidable"] > 0), settled & ~(c["unavoidable"] > 0)
-        self.outside = c["start_certificate_m"] >= 0.0
+        self.outside = c["start_safety_margin_m"] >= 0.0
         self.deadlocked = c["deadlocks"] > 0
 
 
@@ -59,16 +59,16 @@ class Figure(NamedTuple):
 
 _UPPER = "95 % upper limit of the probability of that"
 _CLOSEST = "quantiles 0, 0.01, ..., 1 of the closest distance of an encounter, m"
-_AVOIDABLE = "encounters with a breach that an own boat could have avoided, by the post-hoc analysis"
-_UNJUDGED = "encounters with breaches that the analysis was not asked about, and no avoidable one"
+_AVOIDABLE = "encounters with a violation that an own boat could have avoided, by the post-hoc analysis"
+_UNJUDGED = "encounters with violations that the analysis was not asked about, and no avoidable one"
 _WHO = "encounters by whose command let the last chance pass: own, opponent, both, neither, start"
-_OUTSIDE = "encounters in which the shield's certificate at the first decision was at least 0"
+_OUTSIDE = "encounters in which the shield's safety margin at the first decision was at least 0"
 _SAFE = "of sampled states that are safe by the value tables, how many commands pass, %"
 _TIME = "time to the first goal over that without a filter; never there counts as the whole length"
 _NEVER = "own boats that had not reached their first goal by the end but do without a filter, %"
 _DEAD = "encounters in which two teammates that want to move stood still for over 10 s"
-_BREACHED = "encounters in which an own boat came within the radius of any boat"
-_SETTLED = "encounters with breaches of which none was avoidable"
+_VIOLATED = "encounters in which an own boat came within the radius of any boat"
+_SETTLED = "encounters with violations of which none was avoidable"
 _CAUTIOUS = f"{_UPPER}; what was not judged counts as avoidable"
 _CHANGED = "share of the own boats' steps whose command was changed, %"
 _TURN = "mean change of the commanded heading over changed steps, deg"
@@ -78,22 +78,26 @@ _LEFT = "how far an own boat left the field at most, m"
 _DECISION = "median time of a decision per game and step, in batches, us"
 FIGURES = {
     "encounters": Figure("n", lambda m, c: m.any.sum(), "encounters played"),
-    "breached": Figure("breached", lambda m, c: m.breached.sum(), _BREACHED),
-    "breached_upper": Figure("", lambda m, c: _upper(m.breached, m.any), f"{_UPPER} (Clopper-Pearson, one-sided)"),
-    "unshielded_breached": Figure("", lambda m, c: m.bare_breached.sum(), "the same scenes without a filter"),
+    "violated": Figure("with violations", lambda m, c: m.violated.sum(), _VIOLATED),
+    "violated_upper": Figure("", lambda m, c: _upper(m.violated, m.any), f"{_UPPER} (Clopper-Pearson, one-sided)"),
+    "unshielded_violated": Figure("", lambda m, c: m.bare_violated.sum(), "the same scenes without a filter"),
     "avoidable": Figure("avoidable", lambda m, c: m.avoidable.sum(), _AVOIDABLE),
     "avoidable_upper": Figure("≤ at 95 %, %", lambda m, c: _upper(m.avoidable | m.not_judged, m.any), _CAUTIOUS),
     "unavoidable": Figure("unavoidable", lambda m, c: m.unavoidable.sum(), _SETTLED),
-    "started_inside": Figure("", lambda m, c: m.inside.sum(), "encounters whose breaches were under way at the start"),
+    "started_inside": Figure(
+        "", lambda m, c: m.inside.sum(), "encounters whose violations were under way at the start"
+    ),
     "not_judged": Figure("", lambda m, c: m.not_judged.sum(), _UNJUDGED),
     "responsible": Figure("", lambda m, c: {s: int((c["responsible"] == k).sum()) for k, s in enumerate(SIDES)}, _WHO),
     "started_outside": Figure("", lambda m, c: m.outside.sum(), _OUTSIDE),
-    "breaches_outside": Figure(
-        "breached, started outside", lambda m, c: (m.breached & m.outside).sum(), "of those, how many were breached"
+    "violations_outside": Figure(
+        "with violations, started outside",
+        lambda m, c: (m.violated & m.outside).sum(),
+        "of those, how many had violations",
     ),
-    "breaches_outside_upper": Figure("", lambda m, c: _upper(m.breached & m.outside, m.outside), _UPPER),
-    "breaches_teammate": Figure("", lambda m, c: int(c["breaches_teammate"].sum()), "entries of two own boats"),
-    "breaches_opponent": Figure("", lambda m, c: int(c["breaches_opponent"].sum()), "of an own boat and another"),
+    "violations_outside_upper": Figure("", lambda m, c: _upper(m.violated & m.outside, m.outside), _UPPER),
+    "violations_teammate": Figure("", lambda m, c: int(c["violations_teammate"].sum()), "entries of two own boats"),
+    "violations_opponent": Figure("", lambda m, c: int(c["violations_opponent"].sum()), "of an own boat and another"),
     "closest_m": Figure("closest, m", lambda m, c: c["closest_m"].min(), "least distance of all encounters, m"),
     "closest_quantiles_m": Figure("", lambda m, c: np.quantile(c["closest_m"], QUANTILES), _CLOSEST),
     "unshielded_closest_quantiles_m": Figure(
@@ -145,7 +149,7 @@ class Outcome:
 
 def measure(
     family: str,
-    guard: str | FilterMaker = SHIELD,
+    safety_filter: str | FilterMaker = SHIELD,
     own: str = "heron",
     other: str = "heron",
     n: int = 200,
@@ -158,8 +162,8 @@ def measure(
 
     Args:
         family: name of the family.
-        guard: name of a safety filter (see `baselines.registry`) or what makes one from (config, games, platforms,
-            team, surroundings).
+        safety_filter: name of a safety filter (see `baselines.registry`) or what makes one from (config, games,
+            platforms, team, surroundings).
         own: platform of the own boats.
         other: platform of the others.
         n: how many encounters.
@@ -176,7 +180,7 @@ def measure(
     asked = conditions or Conditions()
     size = chunk_size(family, own, other, asked, seed, first)
     parts = [
-        measure_chunk(draw(family, own, other, asked, seed, k, min(size, first + n - k)), guard, asked, judge)
+        measure_chunk(draw(family, own, other, asked, seed, k, min(size, first + n - k)), safety_filter, asked, judge)
         for k in range(first, first + n, size)
     ]
     columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
@@ -184,18 +188,21 @@ def measure(
 
 
 WORST = {
-    "guard": ("filter", "safety filter"),
+    "filter": ("filter", "safety filter"),
     "own": ("own", "platform of the own boats"),
     "other": ("other", "platform of the others"),
     "family": ("family", "family"),
     "number": ("number", "number of the encounter: with family, platforms and seed it gives the scene"),
     "variant": ("variant", "which of its variants (sudden turns) was the worst"),
     "closest_m": ("closest, m", "closest distance, m"),
-    "breaches": ("breaches", "entries into the radius"),
+    "violations": ("violations", "entries into the radius"),
     "avoidable": ("avoidable", "of those judged, how many were avoidable"),
     "last_preventable_s": ("until, s before", "how long before it an own boat could still avoid it, s; null: never"),
     "responsible": ("last chance let pass by", "whose command let the last chance pass; null when not judged"),
-    "start_certificate_m": ("certificate at the start, m", "the shield's at the first decision, m; null: nobody near"),
+    "start_safety_margin_m": (
+        "safety margin at the start, m",
+        "the shield's at the first decision, m; null: nobody near",
+    ),
 }
 """Words of the report's table, and meaning, of every key of the worst encounters."""
 _NESTED = {"responsible": ".*", "closest_quantiles_m": "[]", "unshielded_closest_quantiles_m": "[]"}
@@ -204,7 +211,7 @@ KEYS = {
     "encounters_played": "encounters in the results, over all cells",
     "encounters_resumed": "of those, how many an earlier run had played",
     "failed[].*": "cell, first encounter and error of a chunk that could not be played",
-    "cells[].guard": "safety filter between policy and boats",
+    "cells[].filter": "safety filter between policy and boats",
     "cells[].own": "platform of the own boats",
     "cells[].other": "platform of the others",
     "cells[].family": "kind of encounter",

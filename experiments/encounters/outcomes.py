@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from steerclear.env.record import find_breaches
+from steerclear.env.record import find_violations
 from steerclear.shield.config import ShieldConfig
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array, BoolArray, IntArray
@@ -41,7 +41,7 @@ MOST_PER_CHUNK = 100
 """Encounters of a chunk: what an interrupted run may lose."""
 BARE_SAME = ("goal_s", "reversals_per_min")
 """Columns kept of the same variant without a filter, with ``unshielded_`` before the name."""
-BARE_WORST = ("closest_m", "breaches_teammate", "breaches_opponent")
+BARE_WORST = ("closest_m", "violations_teammate", "violations_opponent")
 """Columns kept of the variant that is worst without a filter."""
 MOST_JUDGED = 5
 """Violations of one game that are judged; a crowd without a filter has hundreds."""
@@ -58,14 +58,14 @@ def _pair_columns(played: Trajectory) -> Columns:
     own, games = played.scenes.own, played.scenes.games
     found: Columns = {}
     for kind in ("teammate", "opponent"):
-        found |= {f"breaches_{kind}": np.zeros(games), f"closest_{kind}_m": np.full(games, math.inf)}
+        found |= {f"violations_{kind}": np.zeros(games), f"closest_{kind}_m": np.full(games, math.inf)}
     for i, j in combinations(range(len(own)), 2):
         if own[i]:
             kind = "teammate" if own[j] else "opponent"
             dx, dy = np.moveaxis(played.state[1:, :, i, :2] - played.state[1:, :, j, :2], -1, 0)
             gap = np.sqrt(dx * dx + dy * dy)
             inside = gap <= played.conditions.radius_m
-            found[f"breaches_{kind}"] += inside[0] + (inside[1:] & ~inside[:-1]).sum(axis=0)
+            found[f"violations_{kind}"] += inside[0] + (inside[1:] & ~inside[:-1]).sum(axis=0)
             found[f"closest_{kind}_m"] = np.minimum(found[f"closest_{kind}_m"], gap.min(axis=0))
     return found | {"closest_m": np.minimum(found["closest_teammate_m"], found["closest_opponent_m"])}
 
@@ -79,7 +79,7 @@ def tally(played: Trajectory) -> Columns:
     """Count for every game.
 
     Returns:
-        Arrays (B,): ``breaches_teammate``, ``breaches_opponent``, ``closest_teammate_m``, ``closest_opponent_m``,
+        Arrays (B,): ``violations_teammate``, ``violations_opponent``, ``closest_teammate_m``, ``closest_opponent_m``,
         ``closest_m``, ``changed_share``, ``heading_change_deg`` and ``speed_change_mps`` (means over changed steps,
         NaN without), ``reversals_per_min`` (per own boat), ``deadlocks``, ``goal_s`` (mean over own boats of the time
         to the first goal, a boat that never reaches it counting with the whole length), ``reached`` (share of own
@@ -124,7 +124,7 @@ def never_arrived(played: Trajectory, bare: Trajectory) -> Array:
     return np.asarray(lost.mean(axis=1))
 
 
-def start_certificate_m(played: Trajectory) -> Array:
+def start_safety_margin_m(played: Trajectory) -> Array:
     """The default shield's safety margin (B,) at the first decision, m, least of the own boats, whatever was played.
 
     It is asked about the true start, with the margins that the conditions call for, so that filters are compared on the
@@ -150,14 +150,16 @@ def safe_boats(scenes: Scenes, state: Array, conditions: Conditions) -> BoolArra
     return safe
 
 
-def inactive_columns(bare: Trajectory, guard: str | FilterMaker, conditions: Conditions, games: IntArray) -> Columns:
+def inactive_columns(
+    bare: Trajectory, safety_filter: str | FilterMaker, conditions: Conditions, games: IntArray
+) -> Columns:
     """Of games (k,) of what was played without a filter, samples that are safe, and how many of these it leaves."""
     steps = np.arange(0, bare.scenes.steps, round(EVERY_S / DT_S))
     scenes = bare.scenes.take(np.tile(games, len(steps)))
     state, nominal = (of[steps][:, games].reshape(scenes.games, *of.shape[2:]) for of in (bare.state, bare.nominal))
     ours = np.broadcast_to(scenes.own, state.shape[:2]).copy()
     safe = safe_boats(scenes, state, conditions)
-    filtered = np.asarray(build_filter(guard, scenes, conditions).decide(state, nominal.copy(), ours))
+    filtered = np.asarray(build_filter(safety_filter, scenes, conditions).decide(state, nominal.copy(), ours))
     alone = safe & (filtered == nominal).all(axis=2)
     return {
         name: marks.reshape(len(steps), len(games), -1).sum(axis=(0, 2)).astype(np.float64)
@@ -176,12 +178,14 @@ def judge_game(played: Trajectory, game: int) -> dict[str, float]:
         avoid it (NaN: never), and ``responsible``, the index in `SIDES`.
     """
     states, scenes, conditions = played.state[:, game], played.scenes, played.conditions
-    found = find_breaches(states[:, :, :2], conditions.radius_m)
+    found = find_violations(states[:, :, :2], conditions.radius_m)
     ours = [row for row in found if scenes.own[row[1:3].astype(int)].any()]
     current = scenes.current[game] * conditions.current_mps
     delays = np.where(scenes.own, conditions.delay_steps(DT_S), 0)
     motion = oracle.Motion(tuple(current.tolist()), tuple(delays.tolist()))
-    judged = oracle.judge_breaches(states, scenes.params, ours[:MOST_JUDGED], conditions.radius_m, DT_S, motion=motion)
+    judged = oracle.judge_violations(
+        states, scenes.params, ours[:MOST_JUDGED], conditions.radius_m, DT_S, motion=motion
+    )
     entries = [_entry(verdict, scenes.own) for verdict in judged]
     counts = {name: float(sum(entry["outcome"] == name for entry in entries)) for name in COUNTS}
     counts["not_judged"] = float(len(ours) - len(judged))
@@ -191,7 +195,7 @@ def judge_game(played: Trajectory, game: int) -> dict[str, float]:
     return counts | {name: chosen[0][name] for name in ("last_preventable_s", "responsible")}
 
 
-def _entry(verdict: oracle.BreachVerdict, own: BoolArray) -> dict[str, Any]:
+def _entry(verdict: oracle.ViolationVerdict, own: BoolArray) -> dict[str, Any]:
     """Outcome for the own side of a violation, how long before it that side could avoid it, s, who is responsible."""
     best, side = own_side(verdict, np.flatnonzero(own).tolist())
     late_s = math.nan if best.last_preventable_s is None else best.last_preventable_s
@@ -209,7 +213,7 @@ def judge_worst(played: Trajectory, counted: Columns, worst: IntArray) -> tuple[
     Returns:
         The game of each encounter that counts, and what `judge_game` says about it.
     """
-    hits, number = counted["breaches_teammate"] + counted["breaches_opponent"], played.scenes.number
+    hits, number = counted["violations_teammate"] + counted["violations_opponent"], played.scenes.number
     chosen, verdicts = [], []
     for first in worst:
         kept, counts = int(first), dict(NO_VERDICT)
@@ -225,35 +229,40 @@ def judge_worst(played: Trajectory, counted: Columns, worst: IntArray) -> tuple[
     return np.array(chosen), verdicts
 
 
-def measure_chunk(scenes: Scenes, guard: str | FilterMaker, conditions: Conditions, judge: bool = True) -> Columns:
+def measure_chunk(
+    scenes: Scenes, safety_filter: str | FilterMaker, conditions: Conditions, judge: bool = True
+) -> Columns:
     """Play a batch of scenes with a filter and without, and count.
 
     Returns:
         Columns (n,) over the encounters, the worst variant of each: ``number``, ``game`` (of the batch), ``variant``,
-        ``start_certificate_m``, those of `tally`, ``never_arrived``, ``unshielded_*`` of `BARE_SAME` and `BARE_WORST`,
+        ``start_safety_margin_m``, those of `tally`, ``never_arrived``, ``unshielded_*`` of `BARE_SAME` and
+        `BARE_WORST`,
         those of `inactive_columns`, ``decision_us`` and ``decision_p999_us`` (of the chunk, per game and step), and the
         verdicts.
     """
-    play(replace(scenes.take([0]), length_s=DT_S), guard, conditions)  # compiles, so that what is timed is deciding
-    played = play(scenes, guard, conditions)
-    without = played if guard == NONE else play(scenes, NONE, conditions)
+    play(
+        replace(scenes.take([0]), length_s=DT_S), safety_filter, conditions
+    )  # compiles, so that what is timed is deciding
+    played = play(scenes, safety_filter, conditions)
+    without = played if safety_filter == NONE else play(scenes, NONE, conditions)
     counted, bare = tally(played) | {"never_arrived": never_arrived(played, without)}, tally(without)
     worst, worst_bare = worst_games(scenes, counted["closest_m"]), worst_games(scenes, bare["closest_m"])
     if judge:
         worst, verdicts = judge_worst(played, counted, worst)
     else:
-        hits = (counted["breaches_teammate"] + counted["breaches_opponent"])[worst]
+        hits = (counted["violations_teammate"] + counted["violations_opponent"])[worst]
         verdicts = [NO_VERDICT | {"not_judged": float(count)} for count in hits]
     decision_us = [float(of(played.decision_us)) for of in (np.median, lambda us: np.quantile(us, 0.999))]
     return {
         "number": scenes.number[worst].astype(np.float64),
         "game": worst.astype(np.float64),
         "variant": np.array([game - np.argmax(scenes.number == scenes.number[game]) for game in worst], float),
-        "start_certificate_m": start_certificate_m(played)[worst],
+        "start_safety_margin_m": start_safety_margin_m(played)[worst],
         **{name: values[worst] for name, values in counted.items()},
         **{f"unshielded_{name}": bare[name][worst] for name in BARE_SAME},
         **{f"unshielded_{name}": bare[name][worst_bare] for name in BARE_WORST},
-        **inactive_columns(without, guard, conditions, worst_bare),
+        **inactive_columns(without, safety_filter, conditions, worst_bare),
         "decision_us": np.full(len(worst), decision_us[0]),
         "decision_p999_us": np.full(len(worst), decision_us[1]),
         **{name: np.array([verdict[name] for verdict in verdicts]) for name in NO_VERDICT},

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from steerclear.env.record import NOT_COVERED, Record, find_breaches, make_record
+from steerclear.env.record import NOT_COVERED, Record, find_violations, make_record
 from steerclear.shield.decision import Reason
 from steerclear.shield.platforms import layout as L
 
@@ -26,9 +26,9 @@ Water = tuple[np.ndarray, np.ndarray]
 """Lower left corner and size of what a replay shows, m."""
 
 
-def records_with_and_without(scenes: Scenes, guard: str, conditions: Conditions, name: str) -> list[Record]:
+def records_with_and_without(scenes: Scenes, safety_filter: str, conditions: Conditions, name: str) -> list[Record]:
     """The first game of some scenes, played with a filter and without, as records that show the same water."""
-    played = [(play(scenes, one, conditions), one) for one in dict.fromkeys((guard, NONE))]
+    played = [(play(scenes, one, conditions), one) for one in dict.fromkeys((safety_filter, NONE))]
     water = _water_of([one.state[:, 0, :, :2] for one, _ in played], scenes)
     return [record_of(one, 0, f"{name}, {by}", by != NONE, water) for one, by in played]
 
@@ -39,24 +39,24 @@ def replay_worst(worst: Sequence[Mapping[str, Any]], conditions: Conditions, see
     for entry in worst:
         scenes = draw(entry["family"], entry["own"], entry["other"], conditions, seed, entry["number"], 1)
         name = f"{entry['family']} {entry['number']}, {entry['own']} and {entry['other']}"
-        records += records_with_and_without(scenes.take([entry["variant"]]), entry["guard"], conditions, name)
+        records += records_with_and_without(scenes.take([entry["variant"]]), entry["filter"], conditions, name)
     return write_replay(records, path, title="The worst encounters")
 
 
-def record_of(played: Trajectory, game: int, title: str, guarded: bool, water: Water | None = None) -> Record:
-    """One game as a record; ``guarded``: its commands passed a filter; ``water``: shown, around all when left out."""
+def record_of(played: Trajectory, game: int, title: str, is_filtered: bool, water: Water | None = None) -> Record:
+    """One game as a record; ``is_filtered``: its commands passed a filter; ``water``: shown; around all if left out."""
     scenes, steps, n, radius_m = played.scenes, played.scenes.steps, len(played.scenes.team), played.conditions.radius_m
     state, margin_m = played.state[:, game], played.safety_margin_m[:, game]
     corner, size = water or _water_of([state[:, :, :2]], scenes)
     position, heading = state[:, :, :2] - corner, state[:, :, L.HEADING]
-    own = np.broadcast_to(scenes.own & guarded, (steps, n))
+    own = np.broadcast_to(scenes.own & is_filtered, (steps, n))
     nominal, filtered = (of[:, game].copy() for of in (played.nominal, played.filtered))
     changed = (nominal != filtered).any(axis=2)
     for commands in (nominal, filtered):
         commands[..., 1] = wrapped(commands[..., 1] + heading[:-1])
-    found = find_breaches(position, radius_m)
+    found = find_violations(position, radius_m)
     return make_record(
-        _meta_of(played, title, size.tolist(), guarded),
+        _meta_of(played, title, size.tolist(), is_filtered),
         position=position,
         heading_deg=wrapped(heading),
         speed_mps=state[:, :, L.SPEED],
@@ -68,11 +68,11 @@ def record_of(played: Trajectory, game: int, title: str, guarded: bool, water: W
         reason=np.where(own, played.reason[:, game], NOT_COVERED).astype(np.uint8),
         intervened=own & changed,
         safety_margin_m=np.where(own & np.isfinite(margin_m), margin_m, np.nan),
-        breaches=found[scenes.own[found[:, 1:3].astype(np.int64)].any(axis=1)],
+        violations=found[scenes.own[found[:, 1:3].astype(np.int64)].any(axis=1)],
     )
 
 
-def _meta_of(played: Trajectory, title: str, bounds: list[float], guarded: bool) -> dict[str, Any]:
+def _meta_of(played: Trajectory, title: str, bounds: list[float], is_filtered: bool) -> dict[str, Any]:
     """Settings of a game that an encounter is shown as."""
     scenes, radius_m = played.scenes, played.conditions.radius_m
     names = [f"agent_{k}" for k in range(len(scenes.team))]
@@ -90,7 +90,7 @@ def _meta_of(played: Trajectory, title: str, bounds: list[float], guarded: bool)
         "separation_m": radius_m,
         "preset": scenes.family,
         "policies": {"blue": "goals", "red": "scripts"},
-        "shielded": [name for name, own in zip(names, scenes.own, strict=True) if own and guarded],
+        "shielded": [name for name, own in zip(names, scenes.own, strict=True) if own and is_filtered],
         "seed": None,
         "reason_names": [reason.name for reason in Reason],
         "platforms": list(scenes.platforms),

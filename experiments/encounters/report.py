@@ -24,17 +24,17 @@ Cell = Mapping[str, Any]
 Cells = Sequence[Cell]
 MOST_M = 15.0
 """Distances beyond this are cut off: nobody is in danger there, m."""
-SHOWN = {"guard": "filter", **{key: one.label for key, one in FIGURES.items() if one.label}}
+SHOWN = {"filter": "filter", **{key: one.label for key, one in FIGURES.items() if one.label}}
 CONDITIONS = {"radius_m": "radius {:g} m", "delay_s": "delay {:g} s", "noise_m": "position error {:g} m"}
 CONDITIONS |= {"current_mps": "current {:g} m/s"}
 NOTE = (
-    "An encounter is breached when an own boat comes within the radius of any boat; avoidable when its own commands "
-    "could have kept the radius. '≤ at 95 %' is the one-sided upper limit of the probability of an avoidable breach "
-    "(Clopper and Pearson), breaches that were not judged counting as avoidable. 'Started outside' are encounters in "
-    "which the shield's certificate at the first decision was at least 0 for every own boat, whatever filter played. "
-    "Changes are means over the changed steps; time to the goal is against the same scenes without a filter, a boat "
-    "that never arrives counting with the whole length. Closest distances beyond 15 m are cut off; the dashed line "
-    "marks the radius."
+    "An encounter has a violation when an own boat comes within the radius of any boat. It is avoidable when the own "
+    "boat's commands could have kept the radius. '≤ at 95 %' is the one-sided upper limit of the probability of an "
+    "avoidable violation (Clopper and Pearson); those not judged count as avoidable. 'Started outside' are encounters "
+    "in which the shield's safety margin at the first decision was at least 0 for every own boat, whatever filter "
+    "played. Changes are means over the changed steps; time to the goal is against the same scenes without a filter, a "
+    "boat that never arrives counting with the whole length. Closest distances beyond 15 m are cut off; the dashed "
+    "line marks the radius."
 )
 
 
@@ -58,7 +58,7 @@ def write_encounter_report(results: Mapping[str, Any], path: Path) -> Path:
     return Report(
         title="Encounters",
         subtitle=" · ".join([f"{settings['n']} encounters per cell", *conditions, f"seed {settings['seed']}"]),
-        tiles=[_tile(guard, cells) for guard in dict.fromkeys(cell["guard"] for cell in cells)],
+        tiles=[_tile(safety_filter, cells) for safety_filter in dict.fromkeys(cell["filter"] for cell in cells)],
         links=[{"path": replay, "label": "the worst encounters, with the filter and without"}] if replay else [],
         goals=results["goals"],
         sections=[
@@ -74,12 +74,12 @@ def write_encounter_report(results: Mapping[str, Any], path: Path) -> Path:
     ).write(path)
 
 
-def _tile(guard: str, cells: Cells) -> Tile:
-    own = [cell for cell in cells if cell["guard"] == guard]
-    n, breached, avoidable = (sum(c[name] for c in own) for name in ("encounters", "breached", "avoidable"))
-    unjudged = breached and all(c["not_judged"] == c["breached"] for c in own)
-    words = "no breach judged" if unjudged else f"avoidable: {avoidable}"
-    return Tile(f"{guard}: encounters breached", None, f"{breached} of {n:,}", words)
+def _tile(safety_filter: str, cells: Cells) -> Tile:
+    own = [cell for cell in cells if cell["filter"] == safety_filter]
+    n, violated, avoidable = (sum(c[name] for c in own) for name in ("encounters", "violated", "avoidable"))
+    unjudged = violated and all(c["not_judged"] == c["violated"] for c in own)
+    words = "no violation judged" if unjudged else f"avoidable: {avoidable}"
+    return Tile(f"{safety_filter}: encounters with violations", None, f"{violated} of {n:,}", words)
 
 
 def _section(pair: tuple[str, str], cells: Cells, settings: Mapping[str, Any]) -> Section:
@@ -97,17 +97,17 @@ def _text(cell: Cell, name: str) -> str:
     text = str(value) if isinstance(value, str | int) else number_text(value)
     if name == "avoidable" and cell["not_judged"]:
         text += f" (+{cell['not_judged']} not judged)"
-    return f"{text} of {cell['started_outside']}" if name == "breaches_outside" else text
+    return f"{text} of {cell['started_outside']}" if name == "violations_outside" else text
 
 
 def _plot(family: str, cells: Cells, settings: Mapping[str, Any]) -> Plot:
     """Share of encounters that came closer than a distance."""
-    named = [name for name in settings["guards"] if name != NONE]
+    named = [name for name in settings["filters"] if name != NONE]
     curves = [("without a filter", "off", cells[0]["unshielded_closest_quantiles_m"])]
     curves += [
-        (cell["guard"], plots.SERIES[named.index(cell["guard"]) % len(plots.SERIES)], cell["closest_quantiles_m"])
+        (cell["filter"], plots.SERIES[named.index(cell["filter"]) % len(plots.SERIES)], cell["closest_quantiles_m"])
         for cell in cells
-        if cell["guard"] != NONE
+        if cell["filter"] != NONE
     ]
     words = "closest distance, m: share that came closer"
     series = [(name, colour, *distribution(quantiles)) for name, colour, quantiles in curves]
@@ -127,18 +127,18 @@ def distribution(quantiles: Sequence[float]) -> tuple[list[float], list[float]]:
 
 def _avoidable_text(cell: Cell) -> Text:
     words = f"{cell['avoidable']}" + (f"+{cell['not_judged']}?" if cell["not_judged"] else "")
-    return Text(words, "red" if cell["avoidable"] and is_shield(cell["guard"]) else "")
+    return Text(words, "red" if cell["avoidable"] and is_shield(cell["filter"]) else "")
 
 
 HEADS: dict[str, tuple[str, Any]] = {
-    "bare": ("encounters breached without a filter", "unshielded_breached"),
-    "hit": ("breached with it", "breached"),
+    "bare": ("encounters with violations without a filter", "unshielded_violated"),
+    "hit": ("with the filter", "violated"),
     "avoid": ("of these avoidable in hindsight (+ not judged?)", _avoidable_text),
     "<=%": ("95 % upper limit of the avoidable ones, % of the encounters", lambda c: _text(c, "avoidable_upper")),
     "unav": ("unavoidable, or begun inside the radius", lambda c: f"{c['unavoidable'] + c['started_inside']}"),
     "out": (
-        "breached of those that started outside the unavoidable set",
-        lambda c: f"{c['breaches_outside']}/{c['started_outside']}",
+        "with violations, of those that started outside the unavoidable set",
+        lambda c: f"{c['violations_outside']}/{c['started_outside']}",
     ),
     "near": ("closest distance, m", "closest_m"),
     "chg%": ("commands changed, %", "changed_percent"),
@@ -158,13 +158,13 @@ def cells_table(results: Mapping[str, Any]) -> list[Group]:
     """Tables for the terminal, one per pair of platforms and filter."""
     groups: dict[tuple[str, str, str], list[Cell]] = {}
     for cell in results["cells"]:
-        groups.setdefault((cell["own"], cell["other"], cell["guard"]), []).append(cell)
+        groups.setdefault((cell["own"], cell["other"], cell["filter"]), []).append(cell)
     tables = []
-    for (own, other, guard), cells in groups.items():
+    for (own, other, safety_filter), cells in groups.items():
         rows = [
             [c["family"], *(_text(c, of) if isinstance(of, str) else of(c) for _, of in HEADS.values())] for c in cells
         ]
         counts = sorted({cell["encounters"] for cell in cells})
         each = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]}-{counts[-1]}"
-        tables.append(titled(f"{own} meets {other}, filter {guard}, {each} each", ["", *HEADS], rows))
+        tables.append(titled(f"{own} meets {other}, filter {safety_filter}, {each} each", ["", *HEADS], rows))
     return tables

@@ -25,7 +25,7 @@ Pair = tuple[str, str]
 MOST_ENCOUNTERS = 1_000_000
 """Encounters of a family, platform and filter at most: all are listed before the first is played."""
 UNAVOIDABLE_PERCENT = 1.0
-"""Most encounters with several others with a separation violation that was unavoidable, %."""
+"""Most encounters with several others that may have unavoidable violations, %."""
 MOST_WORST = 10
 FAR_M = 1e4
 """A safety margin beyond this, m, says that nobody is near."""
@@ -34,7 +34,7 @@ FAR_M = 1e4
 class Cell(NamedTuple):
     """One row of the table: a safety filter on encounters of a family between two platforms."""
 
-    guard: str
+    filter: str
     own: str
     other: str
     family: str
@@ -50,7 +50,7 @@ class Settings:
 
     platforms: tuple[Pair, ...]
     families: tuple[str, ...]
-    guards: tuple[str, ...] = ("shield",)
+    filters: tuple[str, ...] = ("shield",)
     n: int = 1000
     seed: int = 0
     conditions: Conditions = field(default_factory=Conditions)
@@ -59,7 +59,7 @@ class Settings:
     def __post_init__(self) -> None:
         check_count("--n", self.n, 1, MOST_ENCOUNTERS)
         check_seed(self.seed)
-        for check, names in ((get_family, self.families), (check_filter, self.guards)):
+        for check, names in ((get_family, self.families), (check_filter, self.filters)):
             for name in names:
                 check(name)
         for name in {name for pair in self.platforms for name in pair}:
@@ -76,8 +76,8 @@ class Settings:
         for own, other in self.platforms:
             for family in self.families:
                 size = chunk_size(family, own, other, self.conditions, self.seed)
-                for guard in self.guards:
-                    cell = Cell(guard, own, other, family)._asdict()
+                for safety_filter in self.filters:
+                    cell = Cell(safety_filter, own, other, family)._asdict()
                     for first in range(0, self.n, size):
                         yield {"cell": cell, **same, "first": first, "count": min(size, self.n - first)}
 
@@ -86,7 +86,7 @@ def play_job(job: Job) -> list[Row]:
     """Play the encounters of a job; a row each."""
     cell, conditions = Cell(**job["cell"]), Conditions(**job["conditions"])
     scenes = draw(cell.family, cell.own, cell.other, conditions, job["seed"], job["first"], job["count"])
-    columns = measure_chunk(scenes, cell.guard, conditions, job["judge"])
+    columns = measure_chunk(scenes, cell.filter, conditions, job["judge"])
     rows = np.array([*columns.values()]).T.tolist()
     return [{**cell._asdict(), **dict(zip(columns, values, strict=True))} for values in rows]
 
@@ -122,22 +122,24 @@ def results_of(run: Run) -> dict[str, Any]:
 def goals_of(cells: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Goals of every shield: no avoidable violation, few unavoidable ones among several others.
 
-    One rammer of the same platform must cause no violation at all where the start was outside the unavoidable set. A
-    count that was not judged leaves the goal without data.
+    One rammer of the same platform must not violate the separation at all where the start was outside the
+    unavoidable set. A count that was not judged leaves the goal without data.
     """
     goals = []
-    for guard in dict.fromkeys(cell["guard"] for cell in cells if is_shield(cell["guard"])):
-        own = [cell for cell in cells if cell["guard"] == guard]
+    for safety_filter in dict.fromkeys(cell["filter"] for cell in cells if is_shield(cell["filter"])):
+        own = [cell for cell in cells if cell["filter"] == safety_filter]
         many = [cell for cell in own if FAMILIES[cell["family"]].others > 1]
         same = [cell for cell in own if cell["family"] == "rammer_1" and cell["own"] == cell["other"]]
         avoidable = float(sum(cell["avoidable"] for cell in own))
-        goals.append(_goal(f"{guard}: encounters with avoidable breaches", avoidable, 0.0, own))
+        goals.append(_goal(f"{safety_filter}: encounters with avoidable violations", avoidable, 0.0, own))
         if same:
-            hit = float(sum(cell["breaches_outside"] for cell in same))
-            goals.append(_goal(f"{guard}: started outside, breached by one rammer", hit, 0.0))
+            hit = float(sum(cell["violations_outside"] for cell in same))
+            goals.append(_goal(f"{safety_filter}: started outside, violations of one rammer", hit, 0.0))
         if many:
             share = 100.0 * max(cell["unavoidable"] / cell["encounters"] for cell in many)
-            goals.append(_goal(f"{guard}: unavoidable, worst of several others, %", share, UNAVOIDABLE_PERCENT, many))
+            goals.append(
+                _goal(f"{safety_filter}: unavoidable, worst of several others, %", share, UNAVOIDABLE_PERCENT, many)
+            )
     return goals
 
 
@@ -151,16 +153,16 @@ def worst_encounters(columns: Mapping[Cell, Columns], most: int = MOST_WORST) ->
 
     Without such a cell, those with another filter, or with none.
     """
-    shields = [cell for cell in columns if is_shield(cell.guard)]
+    shields = [cell for cell in columns if is_shield(cell.filter)]
     found = []
-    for cell in shields or [cell for cell in columns if cell.guard != NONE] or columns:
+    for cell in shields or [cell for cell in columns if cell.filter != NONE] or columns:
         values = columns[cell]
         for k in np.lexsort((values["closest_m"], -values["avoidable"]))[:most]:
             one: dict[str, Any] = {**cell._asdict(), **{name: float(column[k]) for name, column in values.items()}}
-            one["breaches"] = one["breaches_teammate"] + one["breaches_opponent"]
-            one |= {name: int(one[name]) for name in ("number", "variant", "breaches", "avoidable")}
+            one["violations"] = one["violations_teammate"] + one["violations_opponent"]
+            one |= {name: int(one[name]) for name in ("number", "variant", "violations", "avoidable")}
             one["responsible"] = side_name(one["responsible"])
-            for name in ("last_preventable_s", "start_certificate_m"):
+            for name in ("last_preventable_s", "start_safety_margin_m"):
                 one[name] = one[name] if abs(one[name]) < FAR_M else None
             found.append({name: one[name] for name in WORST})
     return sorted(found, key=lambda entry: (-entry["avoidable"], entry["closest_m"]))[:most]

@@ -212,7 +212,7 @@ class Trajectory:
         return getattr(self, names[name])
 
 
-def play(scenes: Scenes, guard: str | FilterMaker | SafetyFilter, conditions: Conditions) -> Trajectory:
+def play(scenes: Scenes, safety_filter: str | FilterMaker | SafetyFilter, conditions: Conditions) -> Trajectory:
     """Play scenes with a safety filter for the own boats: a name, what makes one, or one made for just these games.
 
     The same scenes, filter and conditions give the same trajectory, and that of a game does not depend on what else is
@@ -221,9 +221,9 @@ def play(scenes: Scenes, guard: str | FilterMaker | SafetyFilter, conditions: Co
     Raises:
         SteerclearError: the filter cannot be made, or what it sends is not finite.
     """
-    safety_filter: Any = guard
-    if isinstance(guard, str) or not hasattr(guard, "decide"):
-        safety_filter = build_filter(guard, scenes, conditions)
+    decider: Any = safety_filter
+    if isinstance(safety_filter, str) or not hasattr(safety_filter, "decide"):
+        decider = build_filter(safety_filter, scenes, conditions)
     world, steps, shape = world_of(scenes, conditions), scenes.steps, (scenes.games, len(scenes.team))
     played = Trajectory(
         scenes=scenes,
@@ -243,13 +243,13 @@ def play(scenes: Scenes, guard: str | FilterMaker | SafetyFilter, conditions: Co
         observe(world.state, world.error, world.seeds, conditions.noise_m, step == 0, DT_S, world.seen)
         want(world, step * DT_S, nominal)
         started = time.perf_counter()
-        answer = safety_filter.decide(world.seen, nominal, ours)
+        answer = decider.decide(world.seen, nominal, ours)
         played.decision_us[step] = (time.perf_counter() - started) / scenes.games * 1e6
         filtered[:] = np.where(ours[..., None], answer, nominal)
         if not np.isfinite(filtered).all():
             b, i, _ = np.argwhere(~np.isfinite(filtered))[0]
             raise FleetError(f"step {step}: the command for boat {i} of game {b} is not finite: {filtered[b, i]}")
-        played.reason[step], played.safety_margin_m[step] = safety_filter.reason, safety_filter.safety_margin_m
+        played.reason[step], played.safety_margin_m[step] = decider.reason, decider.safety_margin_m
         move(world, filtered, step)
         played.state[step + 1] = world.state
     return played

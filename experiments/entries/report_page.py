@@ -12,7 +12,7 @@ from steerclear.policies.submissions.made_for import made_for
 from steerclear.policies.submissions.stage import Stage
 
 from ..ablation import AblationSettings
-from ..metrics import breach_column, check, game_goals
+from ..metrics import check, game_goals, violation_column
 from ..play.spec import MatchSpec
 from ..report import Report, Section
 from ..statistics import paired_difference
@@ -120,7 +120,7 @@ def by_opponent(rows: Sequence[Row], settings: EntryGames) -> dict[str, list[pd.
     """
     import pandas as pd
 
-    columns = {f"{kind}s": breach_column(kind, settings.separation_m) for kind in ("teammate", "opponent")}
+    columns = {f"{kind}s": violation_column(kind, settings.separation_m) for kind in ("teammate", "opponent")}
     table = pd.DataFrame(rows).rename(columns={column: name for name, column in columns.items()})
     table["net"] = table["captures"] - table["captures_against"]
     ways = [(settings.own, False), *([(settings.zip_file, False)] if settings.zip_file else []), (settings.own, True)]

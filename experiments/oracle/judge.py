@@ -24,7 +24,18 @@ from numpy.typing import NDArray
 
 from .boat_model import MEMORY, N_STATE, Array, IntArray, replay, rows_of, top_mps, turned
 from .search import Task, commands_of, search
-from .verdict import AT_ONCE, BreachVerdict, Level, Motion, OracleError, Outcome, Plan, Responsible, Settings, Verdict
+from .verdict import (
+    AT_ONCE,
+    Level,
+    Motion,
+    OracleError,
+    Outcome,
+    Plan,
+    Responsible,
+    Settings,
+    Verdict,
+    ViolationVerdict,
+)
 
 ROUNDING_M = 1e-9
 """Added to the radius, so that a plan replayed with other rounding is still clear, m."""
@@ -63,32 +74,32 @@ def judge(
     return _judge(_record_of(states, boats, radius_m, dt_s, settings, motion), own, step, other)
 
 
-def judge_breach(
+def judge_violation(
     states: Any, boats: Any, pair: tuple[int, int], step: int, radius_m: float, dt_s: float = 0.1, **rest: Any
-) -> BreachVerdict:
-    """Judge a violation from both sides; further arguments as for `judge_breaches`."""
-    return judge_breaches(states, boats, [(step, *pair)], radius_m, dt_s, **rest)[0]
+) -> ViolationVerdict:
+    """Judge a violation from both sides; further arguments as for `judge_violations`."""
+    return judge_violations(states, boats, [(step, *pair)], radius_m, dt_s, **rest)[0]
 
 
-def judge_breaches(
+def judge_violations(
     states: Any,
     boats: Any,
-    breaches: Iterable[Any],
+    violations: Iterable[Any],
     radius_m: float,
     dt_s: float = 0.1,
     driven: Any = None,
     settings: Settings = DEFAULT,
     motion: Motion = AT_ONCE,
-) -> list[BreachVerdict]:
+) -> list[ViolationVerdict]:
     """Judge separation violations of one record, each from both sides; other arguments as for `judge`.
 
-    ``breaches``: rows (step, boat a, boat b, ...); further columns are ignored. ``driven``: (T, n) bool, whether the
+    ``violations``: rows (step, boat a, boat b, ...); further columns are ignored. ``driven``: (T, n) bool, whether the
     game controlled the boat in step k -> k+1; None: never.
 
     Raises:
         OracleError: see `judge`, or ``driven`` has another shape or type.
     """
-    rows = [tuple(int(value) for value in row[:3]) for row in breaches]
+    rows = [tuple(int(value) for value in row[:3]) for row in violations]
     if not rows:
         return []
     record, verdicts = _record_of(states, boats, radius_m, dt_s, settings, motion), []
@@ -100,7 +111,7 @@ def judge_breaches(
         )
     for step, a, b in rows:
         first, second = _judge(record, a, step, b), _judge(record, b, step, a)
-        verdicts.append(BreachVerdict(step, first, second, Responsible.of(first, second, game)))
+        verdicts.append(ViolationVerdict(step, first, second, Responsible.of(first, second, game)))
     return verdicts
 
 
@@ -166,7 +177,7 @@ def _partner(record: _Record, own: int, step: int, other: int | None) -> int:
     if not gaps[partner] <= record.radius_m or (step > 1 and before[partner] <= record.radius_m):
         raise OracleError(
             f"boats {own} and {partner} are {gaps[partner]:.3f} m apart at step {step} and {before[partner]:.3f} m "
-            f"before it, which is no breach of {record.radius_m:g} m; give the first step inside the radius"
+            f"before it, which is no violation of {record.radius_m:g} m; give the first step inside the radius"
         )
     return partner
 

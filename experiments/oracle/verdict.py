@@ -201,7 +201,7 @@ class Verdict:
 
 
 @dataclass(frozen=True)
-class BreachVerdict:
+class ViolationVerdict:
     """A separation violation judged from both sides; ``step`` is the index of the first state inside the radius."""
 
     step: int

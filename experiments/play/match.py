@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 from steerclear.env.core import BatchedMctf
 from steerclear.env.mctf import MctfEnv
-from steerclear.env.record import GameRecorder, Record, absolute_commands, find_breaches, meta_of
+from steerclear.env.record import GameRecorder, Record, absolute_commands, find_violations, meta_of
 from steerclear.policies.entrants.play import EntrantTeam
 from steerclear.policies.registry import KEYBOARD
 from steerclear.policies.scripted.team import ScriptedTeam
 from steerclear.shield.exceptions import GameError, SteerclearError
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import layout as L
+from steerclear.shield.renamed import Renamed
 
 from ..entries.team import make_team
 from ..game_metrics import reason_counts, scores, tally
@@ -125,7 +126,7 @@ class Match:
             if watcher is not None and not watcher(self.env):
                 break
         record = self._recorder.finish()
-        record["breaches"] = find_breaches(record["position"], self.shielding.separation_m)
+        record["violations"] = find_violations(record["position"], self.shielding.separation_m)
         return MatchResult(self.spec, self._row(record, time.perf_counter() - started), record)
 
     def seat(self, team: int, policy: Any) -> None:
@@ -139,7 +140,7 @@ class Match:
             team.close()
         self.env.close()
 
-    def breaches(self, record: Record, team: int) -> list[dict[str, Any]] | None:
+    def violations(self, record: Record, team: int) -> list[dict[str, Any]] | None:
         """Judge the hits of a team, 0 blue or 1 red, of the game just played; None where none are judged."""
         if self._log is None:
             return None
@@ -178,11 +179,11 @@ class Match:
         """Boats that a human steers: the first of a team whose policy is the keyboard."""
         return frozenset(self._boats_of(k)[0] for k, name in enumerate(self.names.values()) if name == KEYBOARD)
 
-    def _note_commands(self, wanted: Array, sent: Array) -> None:
+    def _note_commands(self, nominal: Array, filtered: Array) -> None:
         if self._moment is not None:  # an earlier step of motion of the same decision is over
             self._record_step()
         heading_deg = self.env.core.state[0, :, L.HEADING]
-        commands = absolute_commands(wanted[0], heading_deg), absolute_commands(sent[0], heading_deg)
+        commands = absolute_commands(nominal[0], heading_deg), absolute_commands(filtered[0], heading_deg)
         seen = self.shielding.read()
         self._moment = (*commands, seen)
         if self.env.renderer is not None:
@@ -193,8 +194,8 @@ class Match:
     def _record_step(self) -> None:
         if self._moment is None:
             raise SteerclearError("the game moved without asking for commands; build the Match anew")
-        wanted, sent, seen = self._moment
-        self._recorder.step(self._view, wanted, sent, seen.reason, seen.intervened, seen.safety_margin_m)
+        nominal, filtered, seen = self._moment
+        self._recorder.step(self._view, nominal, filtered, seen.reason, seen.intervened, seen.safety_margin_m)
         self._driven.append(self.env.core.driven[0].copy())
         if self._log is not None:
             self._log.step(self.env.core)
@@ -214,8 +215,8 @@ class Match:
         quantiles = np.quantile(timed, [0.5, 0.99, 1.0]).tolist() if timed else [None] * 3
         failed = [self.teams[team].failures() for team in (own, 1 - own)]
         texts = [f"{who}: {text}" for who, one in zip(("own", "opponent"), failed, strict=True) for text in one.texts]
-        breaches = self.breaches(record, own)
-        return {
+        violations = self.violations(record, own)
+        row = {
             "pairing": spec.pairing,
             "game": spec.game,
             "shielded": spec.shield is not None,
@@ -233,10 +234,11 @@ class Match:
             "policy_usable_steps": failed[0].usable_steps,
             "opponent_policy_usable_steps": failed[1].usable_steps,
             "first_failure": texts[0] if texts else None,
-            **verdict_columns(breaches, self.shielding.separation_m),
-            "breaches": breaches,
+            **verdict_columns(violations, self.shielding.separation_m),
+            "violations": violations,
             "wall_s": wall_s,
         }
+        return Renamed(row)
 
 
 def play_match(

@@ -1,7 +1,7 @@
 """Start places of experiments: random, at rest, far enough apart that no hit is decided at the start.
 
 Most policies are deterministic, so games differ by their start places alone; the preset's own random starts
-give boats speeds and places from which a breach cannot be avoided, which would say nothing about a shield.
+give boats speeds and places from which a violation cannot be avoided, which would say nothing about a shield.
 """
 
 from __future__ import annotations

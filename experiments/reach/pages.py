@@ -156,8 +156,8 @@ def card_rows(card: Card) -> list[list[str]]:
         f"change of areas on a grid {COARSER:g} times coarser, mean": "{1[mean]:.1%}",
         "the same, largest": "{1[largest]:.1%}",
         "runs of the full model": "{2[runs]:,}",
-        "of these breached": "{2[breaches]:,}",
-        "deepest breach, m": "{2[depth_m]:.2f}",
+        "of these with violations": "{2[breaches]:,}",
+        "deepest violation, m": "{2[depth_m]:.2f}",
         "margin on the value from which none did, m": "{2[margin_m]:.2f}",
     }
     texts = [[name, *(text.format(*one).replace("%", " %") for one in found)] for name, text in rows.items()]

@@ -198,13 +198,13 @@ def compare_pair(
     """Areas of both sets, up to the table's range, for one relative heading and pair of speeds."""
     radius_m = config.separation_m + config.buffer_m + 2.0 * config.position_error_m
     state, cells = _all_round(values, (heading_deg, own_mps, other_mps), radius_m, (RANGES, BEARINGS, 0.0))
-    ours = certificates_m(state, (values.card.own, values.card.other), config) < 0.0
+    ours = safety_margins_m(state, (values.card.own, values.card.other), config) < 0.0
     theirs = values_m(values, state) < radius_m
     disc, areas = math.pi * radius_m**2, [float(cells[lost].sum()) for lost in (ours, theirs, theirs & ~ours)]
     return SetPair(own_mps, other_mps, heading_deg, disc + areas[0], disc + areas[1], areas[2])
 
 
-def certificates_m(state: Array, names: tuple[str, str], config: ShieldConfig) -> Array:
+def safety_margins_m(state: Array, names: tuple[str, str], config: ShieldConfig) -> Array:
     """The shield's safety margin for the first boat of every state, m."""
     shield = BatchedShield(config, len(state), names, (0, 1))
     nominal = np.zeros((len(state), 2, 2))

@@ -43,7 +43,7 @@ def state_line(fleet: SimFleet) -> str:
 def content_of(fleet: SimFleet, team: int) -> dict[str, Any]:
     """Return the figures described in `docs.KEYS`, with a team's separation violations if the game was recorded."""
     recorded = fleet.truth is not None
-    breaches = fleet.judge(team) if recorded else None
+    violations = fleet.judge(team) if recorded else None
     return {
         "command": "sim-boats",
         "versions": versions(),
@@ -56,7 +56,7 @@ def content_of(fleet: SimFleet, team: int) -> dict[str, Any]:
         "closest": [dict(vars(approach)) for approach in fleet.closest_approaches()],
         "captures": None if fleet.truth is None else fleet.truth.captures,
         "tags": None if fleet.truth is None else fleet.truth.tags,
-        "breaches": breaches,
+        "violations": violations,
     }
 
 
@@ -73,9 +73,11 @@ def approaches_table(content: dict[str, Any]) -> Group:
 def verdicts_table(content: dict[str, Any]) -> Group:
     """Return the own team's separation violations by kind and verdict."""
     when = {False: "during the run", True: "after it"}
-    counted = Counter((when[breach["after_run"]], breach["kind"], breach["verdict"]) for breach in content["breaches"])
+    counted = Counter(
+        (when[violation["after_run"]], violation["kind"], violation["verdict"]) for violation in content["violations"]
+    )
     rows = [[*what, str(number)] for what, number in sorted(counted.items())]
-    return titled("Breaches of the own team", ["", "with", "verdict", "number"], rows or [["none", "", "", "0"]])
+    return titled("Violations of the own team", ["", "with", "verdict", "number"], rows or [["none", "", "", "0"]])
 
 
 def _boat(fleet: SimFleet, name: str) -> dict[str, Any]:

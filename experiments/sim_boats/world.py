@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from steerclear.env.record import DEFAULT_SEPARATION_M, GameRecorder, Record, find_breaches, meta_of
+from steerclear.env.record import DEFAULT_SEPARATION_M, GameRecorder, Record, find_violations, meta_of
 from steerclear.experiments.verdicts import StateLog, judge_game
 from steerclear.shield.bridge.feed import FeedSender
 from steerclear.shield.bridge.feed_packets import Fix
@@ -146,7 +146,7 @@ class TruthRecord:
         ``state`` is (T+1, n, N_STATE); ``commanded`` (T, n) says whether each boat obeyed a commander.
         """
         record = self._recorder.finish()
-        record["breaches"] = find_breaches(record["position"], self._separation_m)
+        record["violations"] = find_violations(record["position"], self._separation_m)
         commanded = np.array([[mark.commanded for mark in row] for row in self._marks], dtype=np.bool_)
         commanded = commanded.reshape(-1, record["position"].shape[1])
         return {**record, "state": self._log.states, "commanded": commanded}
@@ -158,9 +158,9 @@ class TruthRecord:
         """
         found = judge_game(self._log, self._game.core.params, self.record(), team)
         last = last_commanded(self._marks) if found else []
-        for breach in found:
-            boats = [self._game.core.config.agent_ids.index(boat) for boat in breach["boats"]]
-            breach.update(circumstances(self._marks, last, breach["step"], boats))
+        for violation in found:
+            boats = [self._game.core.config.agent_ids.index(boat) for boat in violation["boats"]]
+            violation.update(circumstances(self._marks, last, violation["step"], boats))
         return found
 
 

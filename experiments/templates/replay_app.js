@@ -31,7 +31,7 @@ class Player {
   readColours() {
     const style = getComputedStyle(document.documentElement), read = (name) => style.getPropertyValue(name).trim();
     this.colours = {};
-    for (const name of ["page", "card", "ink", "muted", "blue", "red", "grid", "edge", "wanted", "changed", "breach", "obstacle", "button"]) {
+    for (const name of ["page", "card", "ink", "muted", "blue", "red", "grid", "edge", "nominal", "changed", "violation", "obstacle", "button"]) {
       this.colours[name] = read(`--${name}`);
     }
     this.colours.blueWater = read("--blue-water");
@@ -68,7 +68,7 @@ class Player {
     this.changed();
   }
 
-  /** Go to the next or previous mark ("breaches" or "changes") of any game shown. */
+  /** Go to the next or previous mark ("violations" or "changes") of any game shown. */
   jump(kind, direction) {
     const half = this.panes[0].game.dt / 2;
     const times = this.panes.flatMap((pane) => pane.game.marks[kind]);
@@ -125,12 +125,12 @@ class Player {
   draw(now) {
     this.stale = false;
     const shown = this.panes.map((pane) => pane.draw(this.time, 0.5 - 0.5 * Math.cos(now / 110)));
-    this.flashing = shown.some(({ breaches }) => breaches.some(({ own }) => own));
+    this.flashing = shown.some(({ violations }) => violations.some(({ own }) => own));
     const minutes = Math.floor((this.time + 0.05) / 60), seconds = Math.max(0, this.time - 60 * minutes);
     byId("clock").textContent = `${String(minutes).padStart(2, "0")}:${seconds.toFixed(1).padStart(4, "0")}`;
     const has = (kind) => this.panes.some((pane) => pane.game.marks[kind].length > 0);
     for (const way of ["previous", "next"]) {
-      byId(`${way}-breach`).disabled = !has("breaches");
+      byId(`${way}-violation`).disabled = !has("violations");
       byId(`${way}-change`).disabled = !has("changes");
     }
   }
@@ -141,8 +141,8 @@ function connectControls(player) {
   click("play", () => player.setPlaying(!player.playing));
   click("back", () => player.step(-1));
   click("forward", () => player.step(1));
-  click("next-breach", () => player.jump("breaches", 1));
-  click("previous-breach", () => player.jump("breaches", -1));
+  click("next-violation", () => player.jump("violations", 1));
+  click("previous-violation", () => player.jump("violations", -1));
   click("next-change", () => player.jump("changes", 1));
   click("previous-change", () => player.jump("changes", -1));
   click("theme", () => player.toggleTheme());
@@ -169,7 +169,7 @@ function connectKeys(player) {
     ArrowRight: (shift) => player.step(shift ? Math.round(1 / player.panes[0].game.dt) : 1),
     ArrowUp: () => player.faster(1),
     ArrowDown: () => player.faster(-1),
-    b: (shift) => player.jump("breaches", shift ? -1 : 1),
+    b: (shift) => player.jump("violations", shift ? -1 : 1),
     i: (shift) => player.jump("changes", shift ? -1 : 1),
     Home: () => player.seek(0),
     End: () => player.seek(player.duration),

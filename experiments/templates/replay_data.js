@@ -60,10 +60,10 @@ class Game {
     this.boats = packed.meta.agent_ids.length;
     this.dt = packed.meta.dt_s;
     this.duration = this.steps * this.dt;
-    this.breaches = packed.breaches;
+    this.violations = packed.violations;
     this.captures = packed.captures;
     this.ownTeam = packed.own_team;
-    this.ownBreaches = this.breaches.filter(([, a, b]) => [a, b].some((boat) => this.meta.team[boat] === this.ownTeam));
+    this.ownViolations = this.violations.filter(([, a, b]) => [a, b].some((boat) => this.meta.team[boat] === this.ownTeam));
     this.values = values;
     this.marks = this.findMarks();
   }
@@ -105,9 +105,9 @@ class Game {
     return (name === undefined ? "reason " + code : name.replaceAll("_", " ").toLowerCase()).replace("qp", "QP");
   }
 
-  /** Times of the own team's breaches, and of steps at which interventions begin. */
+  /** Times of the own team's violations, and of steps at which interventions begin. */
   findMarks() {
-    const breaches = [...new Set(this.ownBreaches.map((breach) => breach[0] * this.dt))];
+    const violations = [...new Set(this.ownViolations.map((violation) => violation[0] * this.dt))];
     const changes = [];
     for (let step = 0; step < this.steps; step++) {
       for (let boat = 0; boat < this.boats; boat++) {
@@ -117,6 +117,6 @@ class Game {
         }
       }
     }
-    return { breaches, changes };
+    return { violations, changes };
   }
 }

@@ -155,16 +155,16 @@ function drawArrow(context, camera, pose, speed, heading, colour, width) {
 
 function drawCommand(context, game, camera, boat, step, pose, colours, teamColour) {
   if (game.steps === 0) return;
-  const sent = [game.command("sent_speed", boat, step), game.command("sent_heading", boat, step)];
+  const filtered = [game.command("filtered_speed", boat, step), game.command("filtered_heading", boat, step)];
   if (!game.intervened(boat, step)) {
     context.globalAlpha = 0.75;
-    drawArrow(context, camera, pose, ...sent, teamColour, 1.6);
+    drawArrow(context, camera, pose, ...filtered, teamColour, 1.6);
     context.globalAlpha = 1;
     return;
   }
-  const wanted = [game.command("wanted_speed", boat, step), game.command("wanted_heading", boat, step)];
-  drawArrow(context, camera, pose, ...wanted, colours.wanted, 1.8);
-  drawArrow(context, camera, pose, ...sent, colours.changed, 4.6);
+  const nominal = [game.command("nominal_speed", boat, step), game.command("nominal_heading", boat, step)];
+  drawArrow(context, camera, pose, ...nominal, colours.nominal, 1.8);
+  drawArrow(context, camera, pose, ...filtered, colours.changed, 4.6);
 }
 
 function drawHull(context, game, camera, boat, step, pose, colours, teamColour) {
@@ -203,8 +203,8 @@ function drawFlag(context, camera, x, y, colour, pole) {
   context.stroke();
 }
 
-/** Pairs of boats within the separation radius, and whether one of them is of the team whose breaches count. */
-function pairsInBreach(game, poses) {
+/** Pairs of boats within the separation radius, and whether one of them is of the team whose violations count. */
+function pairsInViolation(game, poses) {
   const pairs = [], isOwn = (boat) => game.meta.team[boat] === game.ownTeam;
   for (let a = 0; a < poses.length; a++) {
     for (let b = a + 1; b < poses.length; b++) {
@@ -215,13 +215,13 @@ function pairsInBreach(game, poses) {
   return pairs;
 }
 
-/** The disc of half the radius. A breach of the team that counts pulses, with a ring in the boat's own colour. */
-function drawSeparation(context, game, camera, boat, step, pose, colours, teamColour, breach, pulse) {
+/** The disc of half the radius. A violation of the team that counts pulses, with a ring in the boat's own colour. */
+function drawSeparation(context, game, camera, boat, step, pose, colours, teamColour, violation, pulse) {
   const radius = game.meta.separation_m / 2;
-  if (breach && breach.own) {
-    fillAndRing(context, camera, pose.x, pose.y, radius * (1 + 0.5 * pulse), colours.breach, 0.4 - 0.25 * pulse, 2.5, []);
+  if (violation && violation.own) {
+    fillAndRing(context, camera, pose.x, pose.y, radius * (1 + 0.5 * pulse), colours.violation, 0.4 - 0.25 * pulse, 2.5, []);
     fillAndRing(context, camera, pose.x, pose.y, radius, teamColour, 0, 2.5, []);
-  } else if (breach) {
+  } else if (violation) {
     fillAndRing(context, camera, pose.x, pose.y, radius, teamColour, 0.12, 1.5, [3, 4]);
   } else if (game.intervened(boat, step)) {
     fillAndRing(context, camera, pose.x, pose.y, radius, colours.changed, 0.3, 1.6, []);
@@ -235,8 +235,8 @@ function drawMoment(context, game, camera, time, colours, options, pulse) {
   const { step, share } = game.at(time);
   const poses = Array.from({ length: game.boats }, (_, boat) => game.pose(boat, step, share));
   const teamColour = (boat) => (game.meta.team[boat] === 0 ? colours.blue : colours.red);
-  const breaches = pairsInBreach(game, poses), inBreach = new Map();
-  for (const breach of [...breaches].sort((a, b) => a.own - b.own)) breach.boats.forEach((boat) => inBreach.set(boat, breach));
+  const violations = pairsInViolation(game, poses), inViolation = new Map();
+  for (const violation of [...violations].sort((a, b) => a.own - b.own)) violation.boats.forEach((boat) => inViolation.set(boat, violation));
   context.clearRect(0, 0, camera.width, camera.height);
   drawField(context, game, camera, colours, options);
   poses.forEach((pose, boat) => {
@@ -246,8 +246,8 @@ function drawMoment(context, game, camera, time, colours, options, pulse) {
     if (options.tag && boat === options.followed) {
       fillAndRing(context, camera, pose.x, pose.y, game.meta.catch_radius_m, teamColour(boat), 0.05, 1, [3, 5]);
     }
-    if (!options.separation && !inBreach.has(boat)) return;
-    drawSeparation(context, game, camera, boat, step, pose, colours, teamColour(boat), inBreach.get(boat), pulse);
+    if (!options.separation && !inViolation.has(boat)) return;
+    drawSeparation(context, game, camera, boat, step, pose, colours, teamColour(boat), inViolation.get(boat), pulse);
   });
   if (options.commands) {
     poses.forEach((pose, boat) => drawCommand(context, game, camera, boat, step, pose, colours, teamColour(boat)));
@@ -260,5 +260,5 @@ function drawMoment(context, game, camera, time, colours, options, pulse) {
   if (options.names) {
     drawLabels(context, game, camera, step, poses, colours, teamColour);
   }
-  return { step, poses, breaches };
+  return { step, poses, violations };
 }

@@ -35,7 +35,7 @@ function marksToKeepClear(game, camera, step, poses) {
   }
   poses.forEach((pose, boat) => {
     if (!game.intervened(boat, step)) return;
-    for (const name of ["wanted", "sent"]) {
+    for (const name of ["nominal", "filtered"]) {
       const turn = game.command(`${name}_heading`, boat, step) * Math.PI / 180;
       const length = game.command(`${name}_speed`, boat, step) * LOOKAHEAD_S * camera.scale;
       if (!Number.isFinite(length)) continue;

@@ -59,10 +59,10 @@ class Pane {
     this.timelineKey = "";
     const { meta } = this.game;
     const badge = (kind, ...parts) => element("span", { className: `badge ${kind}` }, ...parts);
-    const covered = meta.shielded.length > 0, breached = this.game.ownBreaches.length > 0;
+    const covered = meta.shielded.length > 0, violated = this.game.ownViolations.length > 0;
     this.badges.replaceChildren(
       badge(covered ? "on" : "", this.sideText(this.game.ownTeam), covered ? ` shielded, ${meta.shielded.length} boats` : " without a shield"), " ",
-      badge(breached ? "breach" : "", ...this.breachText()));
+      badge(violated ? "violation" : "", ...this.violationText()));
     const word = (text, kind) => element("span", { className: kind, textContent: text });
     this.note.replaceChildren("timeline: ", word("share of boats whose command was changed", "orange"), ", ",
       word("hits", "pink"), ", captures · table: speeds m/s, compass headings, margin = safety margin, room beyond the required distance, m · ",
@@ -79,9 +79,9 @@ class Pane {
   }
 
   /** How often boats came too close, the other team among itself apart: no shield answers for that. */
-  breachText() {
-    const { ownTeam, ownBreaches, breaches } = this.game, other = breaches.length - ownBreaches.length;
-    const parts = [this.sideText(ownTeam), `: ${ownBreaches.length} hit${ownBreaches.length === 1 ? "" : "s"}`];
+  violationText() {
+    const { ownTeam, ownViolations, violations } = this.game, other = violations.length - ownViolations.length;
+    const parts = [this.sideText(ownTeam), `: ${ownViolations.length} hit${ownViolations.length === 1 ? "" : "s"}`];
     return other ? [...parts, ` (and ${other} among `, this.sideText(1 - ownTeam), ")"] : parts;
   }
 
@@ -153,17 +153,17 @@ class Pane {
     this.timeline.setAttribute("aria-valuenow", Math.min(time, this.game.duration).toFixed(1));
   }
 
-  fill({ step, breaches }) {
+  fill({ step, violations }) {
     const game = this.game, [blue, red] = game.score(step);
     this.score.replaceChildren(element("span", { className: "blue", textContent: blue }), " : ",
       element("span", { className: "red", textContent: red }));
-    const inBreach = new Map();
-    for (const breach of [...breaches].sort((a, b) => a.own - b.own)) breach.boats.forEach((boat) => inBreach.set(boat, breach));
+    const inViolation = new Map();
+    for (const violation of [...violations].sort((a, b) => a.own - b.own)) violation.boats.forEach((boat) => inViolation.set(boat, violation));
     [...this.rows.children].forEach((row, boat) => {
       const texts = game.steps === 0 ? ["", "–", "–", "–", "–", "–"] : this.texts(boat, step);
       const bits = [[HAS_FLAG, "flag"], [TAGGED, "tagged"], [OUT, "out"]];
       const states = bits.filter(([mask]) => game.bit(boat, step, mask)).map(([, text]) => text);
-      const near = inBreach.get(boat);
+      const near = inViolation.get(boat);
       if (near) states.push(`${near.own ? "hit" : "close"} ${near.gap.toFixed(2)} m`);
       texts[6] = states.join(", ");
       for (let k = 1; k < texts.length; k++) if (row.cells[k].textContent !== texts[k]) row.cells[k].textContent = texts[k];
@@ -175,7 +175,7 @@ class Pane {
   texts(boat, step) {
     const game = this.game;
     const command = (name) => commandText(game.command(`${name}_speed`, boat, step), game.command(`${name}_heading`, boat, step));
-    return ["", numberText(game.state("speed", boat, step), 2), command("wanted"), command("sent"),
-      game.reasonText(game.command("reason", boat, step)), numberText(game.command("certificate", boat, step), 2)];
+    return ["", numberText(game.state("speed", boat, step), 2), command("nominal"), command("filtered"),
+      game.reasonText(game.command("reason", boat, step)), numberText(game.command("safety_margin", boat, step), 2)];
   }
 }

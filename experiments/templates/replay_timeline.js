@@ -1,4 +1,4 @@
-// The still part of a game's timeline: captures above, share of changed commands and breaches, time below.
+// The still part of a game's timeline: captures above, share of changed commands and violations, time below.
 
 const BAND_TOP = 12, BAND_FOOT = 14;
 
@@ -7,11 +7,11 @@ function drawMarks(context, game, width, height, colours) {
   context.fillStyle = colours.button;
   context.fillRect(0, BAND_TOP, width, foot - BAND_TOP);
   drawChanges(context, game, width, foot, colours);
-  const own = new Set(game.ownBreaches);
-  context.fillStyle = colours.breach;
-  for (const breach of game.breaches) {
-    const top = own.has(breach) ? BAND_TOP : foot - 9;
-    context.fillRect(at(breach[0]) - 1, top, own.has(breach) ? 2.5 : 1.5, foot - top);
+  const own = new Set(game.ownViolations);
+  context.fillStyle = colours.violation;
+  for (const violation of game.violations) {
+    const top = own.has(violation) ? BAND_TOP : foot - 9;
+    context.fillRect(at(violation[0]) - 1, top, own.has(violation) ? 2.5 : 1.5, foot - top);
   }
   drawCaptures(context, game, at, width, colours);
   drawTimes(context, game, width, height, foot, colours);

@@ -7,7 +7,9 @@ same play therefore serves both sides.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from steerclear.env.core import BatchedMctf
 from steerclear.shield.platforms import layout as L
@@ -85,7 +87,7 @@ def look(core: BatchedMctf, team: int, game: int = 0) -> Observation:
     """Return what a team sees of a game."""
     turned, (width, height) = is_turned(core, team), core.config.env_bounds_m
 
-    def place(point: list[float]) -> Point:
+    def place(point: Sequence[float]) -> Point:
         return (width - point[0], height - point[1]) if turned else (point[0], point[1])
 
     boats = _boats(core, game, place, math.pi if turned else 0.0)
@@ -118,14 +120,14 @@ def docks_of(core: BatchedMctf, team: int) -> list[list[float]]:
     return [list(dock) for dock in found.tolist()]
 
 
-def _boats(core: BatchedMctf, game: int, place: object, turn: float) -> list[Boat]:
+def _boats(core: BatchedMctf, game: int, place: Callable[[Sequence[float]], Point], turn: float) -> list[Boat]:
     rows, tops = core.state[game].tolist(), core.max_speed_mps.tolist()
     tagged, carries, on_side = (flags[game].tolist() for flags in (core.is_tagged, core.has_flag, core.on_side))
     charge, full = core.tagging_cooldown_s[game].tolist(), core.config.tagging_cooldown_s
-    radii = core.config.agent_radius_m
+    radii: Any = core.config.agent_radius_m
     return [
         Boat(
-            *place((row[L.X], row[L.Y])),  # type: ignore[operator]
+            *place((row[L.X], row[L.Y])),
             math.radians(row[L.HEADING]) + turn,
             row[L.SPEED],
             tops[i],

@@ -31,13 +31,13 @@ def reported_margin(i: int, scene: Scene) -> float:
     Inside the separation it is minus the boat's depth there now.
     """
     state = scene.state
-    least, in_breach = FAR, False
+    least, in_violation = FAR, False
     for j in range(state.shape[0]):
         if j != i and scene.neighbours[i, j] and scene.inside_separation[i, j]:
-            in_breach = True
+            in_violation = True
             gap = math.hypot(state[i, L.X] - state[j, L.X], state[i, L.Y] - state[j, L.Y])
             least = min(least, gap - scene.radius[i, j])
-    if in_breach:
+    if in_violation:
         return least
     return scene.clear[i, MARGIN] if scene.clear[i, MARGIN] < FAR else math.inf
 

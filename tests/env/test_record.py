@@ -16,7 +16,7 @@ from steerclear.env.record import (
     NOT_COVERED,
     GameRecorder,
     absolute_commands,
-    find_breaches,
+    find_violations,
     load,
     make_record,
     meta_of,
@@ -26,6 +26,7 @@ from steerclear.env.record import (
 )
 from steerclear.env.record_file import LATER
 from steerclear.shield.exceptions import TraceError
+from steerclear.shield.renamed import current_keys, earlier_keys
 
 
 def test_a_record_survives_the_disk_bit_for_bit(game_record, tmp_path):
@@ -94,7 +95,7 @@ def test_what_older_versions_did_not_write_is_filled_in(game_record, tmp_path):
 @pytest.mark.parametrize("name", [name for name in ARRAYS if name != "nominal"])
 def test_an_array_of_another_length_is_named(game_record, name):
     values = game_record[name]
-    short = values[:, :3] if name == "breaches" else values[:-1]
+    short = values[:, :3] if name == "violations" else values[:-1]
     with pytest.raises(TraceError, match=f"{name} has shape"):
         validate({**game_record, name: short})
 
@@ -113,9 +114,9 @@ def test_states_must_be_finite(game_record, name, value):
     [
         ({"meta": np.array("{")}, "meta is not JSON"),
         ({"meta": np.array("[]")}, "meta lacks"),
-        ({"breaches": np.array([[999.0, 0, 1, 1.0]])}, "step beyond 60"),
-        ({"breaches": np.array([[5.0, 0, 9, 1.0]])}, "boat beyond 3"),
-        ({"breaches": np.array([[-1.0, 0, 1, 1.0]])}, "breaches name a step"),
+        ({"violations": np.array([[999.0, 0, 1, 1.0]])}, "step beyond 60"),
+        ({"violations": np.array([[5.0, 0, 9, 1.0]])}, "boat beyond 3"),
+        ({"violations": np.array([[-1.0, 0, 1, 1.0]])}, "violations name a step"),
         *(({"meta": {key: None}}, f"meta lacks {key}") for key in META_KEYS),
         ({"meta": {"team": [0, 1]}}, "one entry for each of the 4 boats"),
     ],
@@ -154,7 +155,7 @@ def test_a_recorded_game_is_what_the_env_showed():
     assert (record["reason"] == NOT_COVERED).all()
     assert not record["intervened"].any()
     assert np.isnan(record["safety_margin_m"]).all()
-    assert record["breaches"].shape == (0, 4)
+    assert record["violations"].shape == (0, 4)
 
 
 def view_of(record, step):
@@ -184,7 +185,7 @@ def test_recording_step_by_step_gives_the_same_record_and_a_step_that_does_not_f
             game_record[name][step] for name in ("nominal", "filtered", "reason", "intervened", "safety_margin_m")
         ]
         recorder.step(view_of(game_record, step + 1), *commands)
-    again = recorder.finish(game_record["breaches"])
+    again = recorder.finish(game_record["violations"])
     for name in ARRAYS:
         np.testing.assert_array_equal(again[name], game_record[name])
 
@@ -221,8 +222,8 @@ def gaps(*gaps_m):
         ((5,), []),
     ],
 )
-def test_breaches_are_entries_into_the_radius(gaps_m, rows):
-    np.testing.assert_allclose(find_breaches(gaps(*gaps_m), 2.5), np.array(rows).reshape(-1, 4))
+def test_violations_are_entries_into_the_radius(gaps_m, rows):
+    np.testing.assert_allclose(find_violations(gaps(*gaps_m), 2.5), np.array(rows).reshape(-1, 4))
 
 
 def test_a_record_has_all_of_a_config(game_meta):
@@ -237,12 +238,15 @@ def test_a_record_has_all_of_a_config(game_meta):
         meta_of(GameConfig.preset("aamas2024"), separation=2.5)
 
 
+OLD = {"wanted": "nominal", "sent": "filtered", "breaches": "violations"}
+
+
 def test_names_of_0_9_are_read_and_answered_with_a_warning(game_record, tmp_path):
-    old = {{"nominal": "wanted", "filtered": "sent"}.get(name, name): values for name, values in game_record.items()}
+    old = {{new: name for name, new in OLD.items()}.get(name, name): values for name, values in game_record.items()}
     np.savez(tmp_path / "old.npz", **old)
     for record in (load(tmp_path / "old.npz"), load(save(old, tmp_path / "again.npz"))):
         assert set(record) == set(game_record)
-        for name, new in (("wanted", "nominal"), ("sent", "filtered")):
+        for name, new in OLD.items():
             with pytest.warns(DeprecationWarning, match=f"'{name}' is now '{new}'") as caught:
                 np.testing.assert_array_equal(record[name], game_record[new])
             assert caught[0].filename == __file__
@@ -250,3 +254,20 @@ def test_names_of_0_9_are_read_and_answered_with_a_warning(game_record, tmp_path
         game_record["told"]
     arrays = {name: values for name, values in old.items() if name != "meta"}
     assert set(make_record(read_meta(old), **arrays)) == set(game_record)
+
+
+def test_renamed_keys_of_results_stand_under_their_earlier_names_and_are_read():
+    results = {
+        "command": "encounters",
+        "settings": {"filters": ["none"], "seed": 0},
+        "cells": [{"filter": "none", "violated": 2, "closest_m": 1.0}, {"filter": "shield", "violated": 0}],
+        "pairings": [{"on": {"violations_opponent_2.5m": {"value": 1.0}}, "name": "a"}],
+    }
+    earlier = {
+        "settings": {"guards": ["none"]},
+        "cells": [{"guard": "none", "breached": 2}, {"guard": "shield", "breached": 0}],
+        "pairings": [{"on": {"breaches_opponent_2.5m": {"value": 1.0}}}],
+    }
+    assert earlier_keys(results) == earlier
+    assert current_keys(earlier)["cells"][0] == {"filter": "none", "violated": 2}
+    assert earlier_keys({"command": "reach", "settings": {"n": 1}}) == {}

@@ -84,20 +84,20 @@ def test_a_changed_command_shows_in_its_own_colour(game_record):
     drawn(game_record, 31)
 
 
-def test_a_breach_shows_in_its_own_colour(game_record):
-    step = int(game_record["breaches"][0, 0])
+def test_a_violation_shows_in_its_own_colour(game_record):
+    step = int(game_record["violations"][0, 0])
     assert step > 1
-    colour = THEMES["light"].breach
-    calm, breach = drawn(game_record, 0, width_px=1280), drawn(game_record, step, width_px=1280)
-    assert share_of(breach, colour) > share_of(calm, colour) + 0.0002
+    colour = THEMES["light"].violation
+    calm, violation = drawn(game_record, 0, width_px=1280), drawn(game_record, step, width_px=1280)
+    assert share_of(violation, colour) > share_of(calm, colour) + 0.0002
 
 
 def test_an_overlay_left_with_the_renderer_is_drawn_until_another_is_given(game):
     renderer = Renderer(game.config, width_px=WIDTH_PX)
     plain = renderer.draw(game.view())
-    wanted = np.tile([2.0, 90.0], (6, 1))
-    sent = np.where(np.arange(6)[:, None] == 1, [1.0, 0.0], wanted)
-    overlay = Overlay.of_commands(wanted, sent)
+    nominal = np.tile([2.0, 90.0], (6, 1))
+    filtered = np.where(np.arange(6)[:, None] == 1, [1.0, 0.0], nominal)
+    overlay = Overlay.of_commands(nominal, filtered)
     assert overlay.intervened.tolist() == [False, True, False, False, False, False]
     assert Overlay.of_commands(np.array([[np.nan, 0.0]]), np.zeros((1, 2))).intervened.tolist() == [True]
     renderer.overlay = overlay

@@ -75,7 +75,7 @@ def test_both_figures_are_in_results_tables_and_pages_and_goals_are_of_the_first
     assert list(first["covered"]) == [False, False]
     run.__dict__.pop("table", None)
     run.rows = [
-        {**row, "breaches_opponent_2.5m": 7, "breaches_teammate_2.5m": 9, "breaches_driven_2.5m": 16}
+        {**row, "violations_opponent_2.5m": 7, "violations_teammate_2.5m": 9, "violations_driven_2.5m": 16}
         if row["covered"] else row for row in run.rows
     ]  # fmt: skip
     results = results_of(run, THREE)
@@ -83,8 +83,8 @@ def test_both_figures_are_in_results_tables_and_pages_and_goals_are_of_the_first
     assert most_instructive(THREE.off_and_on(run.table), 2.5)[1]["covered"] is False
     (summary,) = results["pairings"]
     assert (summary["games_off"], summary["games_on"], summary["games_covered"]) == (1, 1, 1)
-    hits = summary["metrics"]["breaches_opponent_2.5m"]
-    assert (hits["covered"]["value"], hits["on"]["value"]) == (7.0, first["breaches_opponent_2.5m"].iloc[1])
+    hits = summary["metrics"]["violations_opponent_2.5m"]
+    assert (hits["covered"]["value"], hits["on"]["value"]) == (7.0, first["violations_opponent_2.5m"].iloc[1])
     assert hits["difference_covered"]["value"] == 7.0 - hits["off"]["value"]
     assert sum(summary["reasons"].values()) == run.rows[1]["covered_steps"]
     assert summary["verdicts"]["covered"]["games"] == 1
@@ -106,10 +106,10 @@ def test_both_figures_are_in_results_tables_and_pages_and_goals_are_of_the_first
 
 
 def hits(row, off, on):
-    return {**row, "breaches_opponent_2.5m": on if row["shielded"] else off}
+    return {**row, "violations_opponent_2.5m": on if row["shielded"] else off}
 
 
-def test_the_most_instructive_game_has_the_most_breaches_without_shield(played):
+def test_the_most_instructive_game_has_the_most_violations_without_shield(played):
     rows = [hits(row, 5 if row["opponent"] == "hold" else 1, 9) for row in played.rows]
     off, on = most_instructive(pd.DataFrame(rows), 2.5)
     assert (off["game"], off["opponent"], off["side"]) == (0, "hold", "blue"), "of those alike the one in blue"
@@ -125,11 +125,13 @@ def goals(rows):
 
 
 def test_goals_judge_pairs_of_all_pairings(played):
-    rows = [{**hits(row, 10, 1), "captures": 4, "breaches_teammate_2.5m": 0} for row in played.rows]
+    rows = [{**hits(row, 10, 1), "captures": 4, "violations_teammate_2.5m": 0} for row in played.rows]
     found = goals(rows)
     assert [goal["met"] for goal in found] == [True, True, True, True, True]
     assert found[1]["value"] == pytest.approx(0.1)
-    worse = [{**hits(row, 10, 2), "captures": 3 if row["shielded"] else 4, "breaches_teammate_2.5m": 1} for row in rows]
+    worse = [
+        {**hits(row, 10, 2), "captures": 3 if row["shielded"] else 4, "violations_teammate_2.5m": 1} for row in rows
+    ]
     assert [goal["met"] for goal in goals(worse)] == [False, False, False, True, True]
     assert goals(worse)[0]["value"] == 4
     stuck = [{**row, "deadlocks": 1 if row["shielded"] else 0} for row in rows]
@@ -146,9 +148,9 @@ def test_hits_of_boats_that_the_game_drives_stand_beside_the_goals_and_miss_none
     rows = [
         {
             **hits(row, 10, 3),
-            "breaches_teammate_2.5m": 2 if row["shielded"] else 0,
-            "breaches_driven_teammate_2.5m": 2 if row["shielded"] else 0,
-            "breaches_driven_opponent_2.5m": 2 if row["shielded"] else 0,
+            "violations_teammate_2.5m": 2 if row["shielded"] else 0,
+            "violations_driven_teammate_2.5m": 2 if row["shielded"] else 0,
+            "violations_driven_opponent_2.5m": 2 if row["shielded"] else 0,
         }
         for row in played.rows
     ]
@@ -166,7 +168,7 @@ def test_hits_of_boats_that_the_game_drives_stand_beside_the_goals_and_miss_none
     judged[1]["avoidable_driven"] = 2
     (told,) = (goal for goal in goals(judged) if goal["name"].startswith("avoidable"))
     assert (told["value"], told["met"]) == (0.25, False)
-    one_more = [{**row, "breaches_teammate_2.5m": row["breaches_teammate_2.5m"] + row["shielded"]} for row in rows]
+    one_more = [{**row, "violations_teammate_2.5m": row["violations_teammate_2.5m"] + row["shielded"]} for row in rows]
     assert (goals(one_more)[0]["value"], goals(one_more)[0]["met"]) == (4.0, False)
     assert not any("drives" in goal.get("note", "") for goal in goals(played.rows)), "none is driven in three seconds"
 
@@ -214,15 +216,15 @@ def test_results_are_written_whole_and_documented(played, tmp_path):
 
 
 def row(game, shielded, **columns):
-    names = ("captures", "grabs", "tags", "breaches_opponent_2.5m", "breaches_opponent_4.0m", "tags_against")
+    names = ("captures", "grabs", "tags", "violations_opponent_2.5m", "violations_opponent_4.0m", "tags_against")
     base = {
         "pairing": "medium vs easy", "game": game, "shielded": shielded, "policy_failures": 0,
-        **dict.fromkeys(names, 0), "captures_against": 1, "net_captures": 1, "breaches_teammate_2.5m": 0,
-        "breaches_teammate_4.0m": 1, "clean_games": True, "closest_m": 3.0, "collisions": 0,
+        **dict.fromkeys(names, 0), "captures_against": 1, "net_captures": 1, "violations_teammate_2.5m": 0,
+        "violations_teammate_4.0m": 1, "clean_games": True, "closest_m": 3.0, "collisions": 0,
         "covered_steps": 300 if shielded else 0, "changed_steps": 30 if shielded else 0,
         "mean_heading_change_deg": 12.0 if shielded else None, "mean_speed_change_mps": 0.25 if shielded else None,
         "decision_p50_us": 80.0 if shielded else None, "decision_p99_us": 200.0 if shielded else None,
-        "breaches_driven_2.5m": 0, "breaches_driven_4.0m": 0,
+        "violations_driven_2.5m": 0, "violations_driven_4.0m": 0,
         "reversals_per_boat_minute": 4.0, "deadlocks": 0, "primary": 0.5, "secondary": 2.0,
         "reason_PASSED": 270 if shielded else 0, "reason_QP_RELAXED": 0,
     }  # fmt: skip

@@ -40,9 +40,9 @@ TINY = ["ablate", "--opponents", "easy", "--games", "2", "--max-time", "40", "--
 FIGURES = {
     "tags": (2.0, 2.0, 2.0),
     "tags_against": (2.0, 2.0, 2.0),
-    "breaches_teammate_2.5m": (2.0, 0.0, 0.0),
-    "breaches_teammate_4.0m": (2.0, 1.0, 2.5),
-    "breaches_driven_4.0m": (1.5, 1.0, 2.5),
+    "violations_teammate_2.5m": (2.0, 0.0, 0.0),
+    "violations_teammate_4.0m": (2.0, 1.0, 2.5),
+    "violations_driven_4.0m": (1.5, 1.0, 2.5),
     "clean_games": (0.0, 1.0, 1.0),
     "closest_m": (0.9098, 3.5511, 3.1749),
     "closest_of_all_m": (0.1879, 3.4758, 2.7234),
@@ -70,7 +70,7 @@ def test_the_same_seeds_give_the_same_figures_and_files(tmp_path, monkeypatch):
     metrics = content["pairings"][0]["metrics"]
     found = {key: tuple(metrics[key].get(s, {}).get("value") for s in ("off", "on", "covered")) for key in FIGURES}
     assert found == {key: pytest.approx(values, abs=5e-4) for key, values in FIGURES.items()}
-    change, hits = metrics["closest_m"]["difference"], metrics["breaches_teammate_2.5m"]["on"]
+    change, hits = metrics["closest_m"]["difference"], metrics["violations_teammate_2.5m"]["on"]
     assert [change[part] for part in ("value", "low", "high")] == pytest.approx([2.6413, 1.9946, 3.2879], abs=5e-4)
     assert (hits["low"], hits["high"], hits["n"]) == (0.0, pytest.approx(-math.log(0.05) / 2), 2)
     reasons = {name: count for name, count in content["pairings"][0]["reasons"].items() if count}

@@ -46,8 +46,8 @@ def row(opponent, game, shielded, **figures):
         "net_captures": figures.get("captures", 0),
         "changed_steps": 0,
         "covered_steps": 100 if shielded else 0,
-        "breaches_opponent_2.5m": 0,
-        "breaches_teammate_2.5m": 0,
+        "violations_opponent_2.5m": 0,
+        "violations_teammate_2.5m": 0,
         **figures,
     }
 

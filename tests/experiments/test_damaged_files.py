@@ -30,12 +30,12 @@ def ablation():
 
 
 def encounters():
-    cell = {"family": "head_on", "guard": "shield", "own": "heron", "other": "heron", "seed": 0, "radius_m": 2.5}
-    cell |= {"delay_s": 0.0, "noise_m": 0.0, "current_mps": 0.0, "encounters": 200, "breached": 3, "avoidable": 0}
+    cell = {"family": "head_on", "filter": "shield", "own": "heron", "other": "heron", "seed": 0, "radius_m": 2.5}
+    cell |= {"delay_s": 0.0, "noise_m": 0.0, "current_mps": 0.0, "encounters": 200, "violated": 3, "avoidable": 0}
     cell |= {"unavoidable": 3, "not_judged": 0, "deadlocked": 0, "changed_percent": 12.5, "goal_time_ratio": 1.1}
-    cell |= {"reversals_per_min": 0.3, "decision_us": None, "started_outside": 190, "breaches_outside": 1}
+    cell |= {"reversals_per_min": 0.3, "decision_us": None, "started_outside": 190, "violations_outside": 1}
     cell |= {"never_arrived_percent": 0.0, "inactive_percent": None}
-    cells = [cell, {**cell, "guard": "none", "breached": 150}, {**cell, "family": "rammer_1"}]
+    cells = [cell, {**cell, "filter": "none", "violated": 150}, {**cell, "family": "rammer_1"}]
     return {"command": "encounters", "settings": {}, "versions": {"steerclear": "0.1.0"}, "cells": cells}
 
 

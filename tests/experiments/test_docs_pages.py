@@ -8,12 +8,12 @@ from steerclear.shield.exceptions import ConfigError
 SETTINGS = {"radius_m": 2.5, "delay_s": 0.0, "noise_m": 0.0, "current_mps": 0.0, "seed": 7}
 
 
-def cell(guard, family, breached=0, avoidable=0, changed=5.0, n=100, own="heron", **more):
+def cell(safety_filter, family, violated=0, avoidable=0, changed=5.0, n=100, own="heron", **more):
     return {
-        "guard": guard, "family": family, "own": own, "other": "heron", "encounters": n, "breached": breached,
-        "avoidable": avoidable, "unavoidable": breached - avoidable, "not_judged": 0, "deadlocked": 0,
+        "filter": safety_filter, "family": family, "own": own, "other": "heron", "encounters": n, "violated": violated,
+        "avoidable": avoidable, "unavoidable": violated - avoidable, "not_judged": 0, "deadlocked": 0,
         "changed_percent": changed, "goal_time_ratio": 1.1, "reversals_per_min": 2.0, "decision_us": 9.0,
-        "started_outside": n, "breaches_outside": breached, "never_arrived_percent": 0.0, "inactive_percent": 90.0,
+        "started_outside": n, "violations_outside": violated, "never_arrived_percent": 0.0, "inactive_percent": 90.0,
         **more,
     }  # fmt: skip
 
@@ -25,11 +25,11 @@ def content(*cells, **settings):
 
 
 def both(first="head_on", second="rammer_1"):
-    """A cautious guard that changes much, a bold one that fails once, none."""
+    """A cautious safety_filter that changes much, a bold one that fails once, none."""
     return content(
-        *(cell("none", family, breached=60, changed=0.0, goal_time_ratio=1.0) for family in (first, second)),
+        *(cell("none", family, violated=60, changed=0.0, goal_time_ratio=1.0) for family in (first, second)),
         cell("cautious", first, changed=40.0), cell("cautious", second, changed=60.0, n=100),
-        cell("bold", first, changed=1.0), cell("bold", second, breached=1, avoidable=1, changed=3.0),
+        cell("bold", first, changed=1.0), cell("bold", second, violated=1, avoidable=1, changed=3.0),
     )  # fmt: skip
 
 
@@ -38,18 +38,20 @@ def test_the_page_shows_what_the_results_say(tmp_path):
         path for path in write_pages([both()], tmp_path) if path.name in ("comparison.md", "comparison.png")
     )
     text = page.read_text()
-    assert "Best (fewest avoidable or unjudged, then fewest breached, then fewest commands changed): **caut" in text
+    assert (
+        "Best (fewest avoidable or unjudged, then fewest with violations, then fewest commands changed): **caut" in text
+    )
     assert "| **cautious** | 200 | 0 [1.5 %] | 0 | 0 | 0 [1.5 %] | 0 [1.5 %] | 50.0 % |" in text
     assert "| rammer_1 | 60, 0 % | 0, 60 % | 1, 3 % |" in text
     assert "steerclear 9.9" in text
     assert picture.read_bytes()[:4] == b"\x89PNG"
 
 
-def test_only_families_that_all_met_count_and_breaches_nobody_judged_are_not_taken_for_unavoidable(tmp_path):
+def test_only_families_that_all_met_count_and_violations_nobody_judged_are_not_taken_for_unavoidable(tmp_path):
     gentle = content(cell("gentle", "head_on", changed=30.0), cell("gentle", "crossing_left", changed=50.0))
-    hidden = content(cell("hidden", "head_on", breached=1, changed=1.0, not_judged=1, unavoidable=0))
+    hidden = content(cell("hidden", "head_on", violated=1, changed=1.0, not_judged=1, unavoidable=0))
     text = comparison_page([both(), gentle, hidden], tmp_path)[1]
-    assert "Families: head_on; seed 7. Not met equally by all guards and left out: rammer_1, crossing_left." in text
+    assert "Families: head_on; seed 7. Not met equally by all filters and left out: rammer_1, crossing_left." in text
     assert ": **bold**." in text, "of those that are safe the gentlest"
     assert "| hidden | 100 | 0 to 1 [4.7 %] | 0 | 1 | 1 [4.7 %] |" in text
     assert best_of({"none": pool([cell("none", "head_on")])}) is None
@@ -69,7 +71,7 @@ def ablation(shield, changed, hits, radius="2.5"):
     metrics = {name: {"label": name, **one} for name in names}
     metrics["changed_share"] = {"label": "changed", "on": figure(changed)}
     for kind in ("teammate", "opponent"):
-        metrics[f"breaches_{kind}_{radius}m"] = {"label": kind, **one, "on": figure(hits)}
+        metrics[f"violations_{kind}_{radius}m"] = {"label": kind, **one, "on": figure(hits)}
     return {
         "command": "ablate",
         "settings": {"preset": "mctf2025", "shield": shield},
@@ -112,14 +114,14 @@ def test_what_no_page_can_be_made_of_is_refused(tmp_path):
     evaluation |= {"quick": False, "seeds": [0], "versions": {"steerclear": "1"}, "goals": [], "pairings": []}
     for contents, words in (
         ([content(broken)], "has no avoidable; run `encounters` again"),
-        ([content()], "no family that all guards met"),
+        ([content()], "no family that all filters met"),
         (
             [{"command": "parity"}],
             "ablate, evaluate, tournament, bench, encounters, reach compare",
         ),
         ([evaluation] * 2, r"two of the results make evaluation_aamas2024\.md; give them one at a time"),
         ([ablation({}, 1.0, 0.0)], "make them again"),
-        ([content(cell("bold", "head_on"), cell("shy", "rammer_1"))], "have no family that all guards met"),
+        ([content(cell("bold", "head_on"), cell("shy", "rammer_1"))], "have no family that all filters met"),
     ):
         with pytest.raises(ConfigError, match=words):
             write_pages(contents, tmp_path)

@@ -35,7 +35,7 @@ def record_of(position, shielded=True, **arrays):
         "reason": reason,
         "intervened": np.zeros((steps, 4)),
         "safety_margin_m": np.full((steps, 4), np.nan),
-        "breaches": np.zeros((0, 4)),
+        "violations": np.zeros((0, 4)),
     }
     return make_record(meta, **{**base, **arrays})
 
@@ -50,15 +50,15 @@ def crossing():
     return track
 
 
-def test_breaches_are_split_by_team_and_radius(crossing):
+def test_violations_are_split_by_team_and_radius(crossing):
     counts = tally(record_of(crossing), 0)
-    assert counts["breaches_teammate_2.5m"] == 1
-    assert counts["breaches_teammate_4.0m"] == 1
-    assert counts["breaches_opponent_2.5m"] == 0
-    assert counts["breaches_opponent_4.0m"] == 1
+    assert counts["violations_teammate_2.5m"] == 1
+    assert counts["violations_teammate_4.0m"] == 1
+    assert counts["violations_opponent_2.5m"] == 0
+    assert counts["violations_opponent_4.0m"] == 1
     assert counts["closest_teammate_m"] == counts["closest_m"] == 2.0
     assert counts["closest_opponent_m"] == 3.0
-    assert tally(record_of(crossing), 0, (3.25,))["breaches_opponent_3.25m"] == 1
+    assert tally(record_of(crossing), 0, (3.25,))["violations_opponent_3.25m"] == 1
     assert counts["collisions"] == 2, "each boat in it counts; the game's radius is 2.5 m"
     assert tally(record_of(crossing), 1)["collisions"] == 0
     crossing[2, 2] = [0, 2]
@@ -77,7 +77,7 @@ def test_a_single_boat_has_no_team_mate_to_be_close_to():
     config = GameConfig.preset("aamas2024", team_size=1)
     record = record_of(np.zeros((3, 4, 2)))
     alone = {name: array[:, :2] if array.ndim > 1 and array.shape[1] == 4 else array for name, array in record.items()}
-    alone["flag_position"], alone["breaches"] = record["flag_position"], record["breaches"]
+    alone["flag_position"], alone["violations"] = record["flag_position"], record["violations"]
     meta = meta_of(config, reason_names=REASONS)
     alone["meta"] = np.array(json.dumps(meta, default=lambda value: np.asarray(value).tolist()))
     counts = tally(alone, 0)
@@ -88,12 +88,12 @@ def test_a_single_boat_has_no_team_mate_to_be_close_to():
 OWN = np.array([True, True, False])
 
 
-def still(steps, speed_mps=0.1, wanted_mps=1.0):
-    return np.full((steps, 3), speed_mps), np.full((steps, 3), wanted_mps)
+def still(steps, speed_mps=0.1, nominal_mps=1.0):
+    return np.full((steps, 3), speed_mps), np.full((steps, 3), nominal_mps)
 
 
 @pytest.mark.parametrize(
-    ("steps", "speed_mps", "wanted_mps", "dt_s", "expected"),
+    ("steps", "speed_mps", "nominal_mps", "dt_s", "expected"),
     [
         (101, 0.1, 1.0, 0.1, 1),
         (100, 0.1, 1.0, 0.1, 0),
@@ -105,14 +105,14 @@ def still(steps, speed_mps=0.1, wanted_mps=1.0):
     ],
 )
 def test_a_deadlock_is_two_mates_that_want_to_move_and_do_not_for_ten_seconds(
-    steps, speed_mps, wanted_mps, dt_s, expected
+    steps, speed_mps, nominal_mps, dt_s, expected
 ):
-    assert count_deadlocks(*still(steps, speed_mps, wanted_mps), OWN, dt_s) == expected
+    assert count_deadlocks(*still(steps, speed_mps, nominal_mps), OWN, dt_s) == expected
 
 
 def test_games_are_counted_apart():
-    speed_mps, wanted_mps = still(101)
+    speed_mps, nominal_mps = still(101)
     two = np.stack([speed_mps, speed_mps + 1.0], axis=1)
     out = np.full(2, -1.0)
-    deadlocks(two, np.stack([wanted_mps, wanted_mps], axis=1), OWN, 100, out)
+    deadlocks(two, np.stack([nominal_mps, nominal_mps], axis=1), OWN, 100, out)
     assert out.tolist() == [1.0, 0.0]

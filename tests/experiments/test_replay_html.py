@@ -8,7 +8,7 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
-from steerclear.env.record import find_breaches, read_meta
+from steerclear.env.record import find_violations, read_meta
 from steerclear.experiments.replay_html import SCRIPTS, at_one_radius, pack, write_replay
 from steerclear.shield.exceptions import ConfigError
 
@@ -83,14 +83,14 @@ def test_the_page_holds_the_record(game_record, tmp_path):
         np.testing.assert_array_equal(bits & mask != 0, record[name])
     np.testing.assert_array_equal(values["reason"].T, record["reason"])
     np.testing.assert_array_equal(values["intervened"].T != 0, record["intervened"])
-    np.testing.assert_allclose(values["certificate"].T, record["safety_margin_m"], atol=1e-3)
-    for name, commands in (("wanted", record["nominal"]), ("sent", record["filtered"])):
-        usable = np.isfinite(commands).all(axis=-1)
+    np.testing.assert_allclose(values["safety_margin"].T, record["safety_margin_m"], atol=1e-3)
+    for name in ("nominal", "filtered"):
+        usable = np.isfinite(record[name]).all(axis=-1)
         np.testing.assert_array_equal(np.isfinite(values[f"{name}_speed"].T), usable)
-        np.testing.assert_allclose(values[f"{name}_speed"].T[usable], commands[usable][:, 0], atol=1e-4)
-        assert angle_error(values[f"{name}_heading"].T[usable], commands[usable][:, 1]).max() < 0.003
+        np.testing.assert_allclose(values[f"{name}_speed"].T[usable], record[name][usable][:, 0], atol=1e-4)
+        assert angle_error(values[f"{name}_heading"].T[usable], record[name][usable][:, 1]).max() < 0.003
     assert game["captures"] == [[0, 0, 0], [40, 1, 0]]
-    np.testing.assert_allclose(game["breaches"], record["breaches"], atol=1e-3)
+    np.testing.assert_allclose(game["violations"], record["violations"], atol=1e-3)
     assert game["meta"]["reason_names"] == read_meta(record)["reason_names"]
     assert game["meta"]["obstacles"]["circle"] == [[3.0, [40.0, 8.0]]]
 
@@ -103,8 +103,8 @@ def test_the_page_is_whole_and_loads_nothing(game_record, tmp_path):
     assert "@@" not in text
     assert "http://" not in text
     assert "https://" not in text
-    for wanted in ("play", "panes", "clock", "speed", "trail", "keys"):
-        assert wanted in page.ids
+    for nominal in ("play", "panes", "clock", "speed", "trail", "keys"):
+        assert nominal in page.ids
     asked = {piece.split('"')[0] for call in ("byId", "click") for piece in page.scripts["code"].split(f'{call}("')[1:]}
     assert len(asked) > 12
     assert asked <= page.ids
@@ -143,7 +143,7 @@ def test_a_game_without_a_shield_counts_hits_at_the_radius_of_the_other(game_rec
     on = {**game_record, "meta": np.array(json.dumps({**meta, "shielded": ["agent_0"], "separation_m": 8.0}))}
     shown, kept = at_one_radius([off, on])
     assert (read_meta(shown)["separation_m"], kept) == (8.0, on)
-    np.testing.assert_array_equal(shown["breaches"], find_breaches(off["position"], 8.0))
+    np.testing.assert_array_equal(shown["violations"], find_violations(off["position"], 8.0))
     assert at_one_radius([off]) == [off]
 
 
@@ -153,8 +153,8 @@ const game = JSON.parse(readFileSync(0, "utf8"));
 Game.open(game).then((opened) => {
   const series = {};
   for (const [name, values] of Object.entries(opened.values)) series[name] = Array.from(values);
-  const { breaches, changes } = opened.marks;
-  console.log(JSON.stringify({ series, breaches, changes, score: opened.score(50), half: opened.pose(0, 3, 0.5) }));
+  const { violations, changes } = opened.marks;
+  console.log(JSON.stringify({ series, violations, changes, score: opened.score(50), half: opened.pose(0, 3, 0.5) }));
 });
 """
 
@@ -168,7 +168,7 @@ def test_the_pages_own_reader_agrees(game_record):
     for name, values in decode(game).items():
         numbers = np.array([np.nan if value is None else value for value in read["series"][name]])
         np.testing.assert_allclose(numbers, values.ravel(), rtol=1e-6, atol=1e-5)
-    assert read["breaches"] == pytest.approx(0.1 * np.unique(game_record["breaches"][:, 0]))
+    assert read["violations"] == pytest.approx(0.1 * np.unique(game_record["violations"][:, 0]))
     assert read["changes"] == pytest.approx([1.0, 3.0])
     assert read["score"] == [1, 0]
     middle = game_record["position"][3:5, 0].mean(axis=0)

@@ -7,7 +7,7 @@ from steerclear.experiments import plots
 from steerclear.experiments.metrics import REASONS
 from steerclear.experiments.report import write_report
 
-NAMES = ("captures", "closest_m", "changed_share", "breaches_teammate_2.5m", "breaches_opponent_2.5m", "tags")
+NAMES = ("captures", "closest_m", "changed_share", "violations_teammate_2.5m", "violations_opponent_2.5m", "tags")
 
 
 def figure(value):

@@ -13,7 +13,7 @@ from steerclear.experiments.runner import execute
 from steerclear.experiments.verdicts import (
     NOT_JUDGED,
     StateLog,
-    all_breaches,
+    all_violations,
     helpless,
     judge_game,
     verdict_columns,
@@ -30,25 +30,25 @@ def spec_of(**settings):
 
 @pytest.fixture(scope="module")
 def judged():
-    """A game of wild boats without a shield, every breach judged."""
+    """A game of wild boats without a shield, every violation judged."""
     return play_match(spec_of(radii_m=(2.5, 4.0)))
 
 
-def test_every_breach_of_the_own_team_has_a_verdict(judged):
+def test_every_violation_of_the_own_team_has_a_verdict(judged):
     row, record = judged.row, judged.record
-    own = [breach for breach in record["breaches"] if min(breach[1:3]) < 3]
-    assert len(row["breaches"]) == len(own) > 0
-    for entry, breach in zip(row["breaches"], own, strict=True):
-        assert (entry["step"], entry["closest_m"]) == (breach[0], breach[3])
-        assert entry["boats"] == [f"agent_{int(boat)}" for boat in breach[1:3]]
-        assert entry["kind"] == ("teammate" if max(breach[1:3]) < 3 else "opponent")
+    own = [violation for violation in record["violations"] if min(violation[1:3]) < 3]
+    assert len(row["violations"]) == len(own) > 0
+    for entry, violation in zip(row["violations"], own, strict=True):
+        assert (entry["step"], entry["closest_m"]) == (violation[0], violation[3])
+        assert entry["boats"] == [f"agent_{int(boat)}" for boat in violation[1:3]]
+        assert entry["kind"] == ("teammate" if max(violation[1:3]) < 3 else "opponent")
         assert entry["verdict"] in ("avoidable", "unavoidable", "started_inside")
         assert (entry["last_preventable_s"] is None) == (entry["verdict"] != "avoidable")
         assert set(entry["responsible_boats"]) <= set(entry["boats"])
     assert undocumented(row, KEYS["rows of ablate"]) == []
     for kind in ("teammate", "opponent"):
         verdicts = ("avoidable", "unavoidable", "started_inside", NOT_JUDGED)
-        assert sum(row[f"{verdict}_{kind}_2.5m"] for verdict in verdicts) == row[f"breaches_{kind}_2.5m"]
+        assert sum(row[f"{verdict}_{kind}_2.5m"] for verdict in verdicts) == row[f"violations_{kind}_2.5m"]
     plain = play_match(spec_of(judge="none"))
     np.testing.assert_array_equal(plain.record["position"], record["position"], "judging changes nothing in the game")
 
@@ -57,9 +57,9 @@ def test_every_breach_of_the_own_team_has_a_verdict(judged):
     ("judge", "shield", "expected"),
     [("none", {}, None), ("shielded", None, None), ("shielded", {}, []), ("all", None, []), ("none", None, None)],
 )
-def test_whose_breaches_are_judged(judge, shield, expected):
+def test_whose_violations_are_judged(judge, shield, expected):
     row = play_match(spec_of(judge=judge, shield=shield, rules={"max_time_s": 1.0}, fixed_start=True)).row
-    assert row["breaches"] == expected
+    assert row["violations"] == expected
     assert row["avoidable_opponent_2.5m"] == (None if expected is None else 0)
 
 
@@ -85,7 +85,7 @@ def head_on(game_meta, driven=False):
         position.append(moved[:, :2])
     first = int(np.flatnonzero(np.abs(30.0 - 0.4 * np.arange(90)) <= 2.5)[0])
     meta = {**game_meta, "separation_m": 2.5, "team": [0, 0, 1, 1], "dt_s": 0.1}
-    record = {"meta": np.array(json.dumps(meta)), "breaches": np.array([[first, 0.0, 2.0, 0.0]])}
+    record = {"meta": np.array(json.dumps(meta)), "violations": np.array([[first, 0.0, 2.0, 0.0]])}
     return log, np.array([get_platform("heron").pack()] * 4), record
 
 
@@ -105,7 +105,7 @@ def test_what_the_game_drove_is_the_games(game_meta):
     assert verdict_columns([{**entry, "verdict": "avoidable"}], 2.5)["avoidable_driven"] == 1
 
 
-def test_beyond_the_most_breaches_nothing_is_judged(game_meta, monkeypatch):
+def test_beyond_the_most_violations_nothing_is_judged(game_meta, monkeypatch):
     monkeypatch.setattr("steerclear.experiments.verdicts.MOST_JUDGED", 0)
     log, params, record = head_on(game_meta)
     entry = judge_game(log, params, record, side=0)[0]
@@ -122,18 +122,18 @@ def stored(tmp_path_factory):
 
 
 def with_verdicts(rows, count):
-    """Give every game so many avoidable breaches."""
+    """Give every game so many avoidable violations."""
     entry = {
         "kind": "opponent", "verdict": "avoidable", "responsible": "own",
         "step": 9, "time_s": 0.9, "boats": ["agent_0", "agent_3"], "radius_m": 2.5,
         "closest_m": 1.5, "last_preventable_s": 1.25, "other_last_preventable_s": None, "exhausted": True,
         "responsible_boats": ["agent_0"],
     }  # fmt: skip
-    return [{**row, "breaches": [entry] * count, "avoidable": count} for row in rows]
+    return [{**row, "violations": [entry] * count, "avoidable": count} for row in rows]
 
 
 def test_verdicts_reach_results_tables_and_report(stored, tmp_path, monkeypatch):
-    monkeypatch.setattr("steerclear.experiments.report.MOST_BREACHES", 1)
+    monkeypatch.setattr("steerclear.experiments.report.MOST_VIOLATIONS", 1)
     settings, played = stored
     run = replace(played, rows=with_verdicts(played.rows, 2), folder=tmp_path)
     write_results(run, results_of(run, settings))
@@ -142,7 +142,7 @@ def test_verdicts_reach_results_tables_and_report(stored, tmp_path, monkeypatch)
     part = content["pairings"][0]["verdicts"]["on"]
     assert (part["games_judged"], part["opponent"]["avoidable"], part["teammate"]["avoidable"]) == (1, 2, 0)
     assert part["opponent"]["responsible"]["own"] == 2
-    assert len(content["breaches"]) == 4
+    assert len(content["violations"]) == 4
     assert [goal["met"] for goal in content["goals"] if "avoidable" in goal["name"]] == [False]
     page = (tmp_path / "report.html").read_text()
     assert "agent_0, agent_3" in page
@@ -151,7 +151,7 @@ def test_verdicts_reach_results_tables_and_report(stored, tmp_path, monkeypatch)
     write_pages([content], tmp_path / "docs")
     text = (tmp_path / "docs/ablation_aamas2024.md").read_text()
     driven = sum(
-        bool(one.get("driven")) for one in content["breaches"] if (one["state"], one["kind"]) == ("on", "opponent")
+        bool(one.get("driven")) for one in content["violations"] if (one["state"], one["kind"]) == ("on", "opponent")
     )
     assert part["opponent"]["game_controlled"] == driven
     assert f"| opponent, on | 2 | {driven} | 2 | 0 | 0 | 0 | 2.00 [0.24, 7.22] |" in text
@@ -159,11 +159,11 @@ def test_verdicts_reach_results_tables_and_report(stored, tmp_path, monkeypatch)
 
 def test_games_that_nobody_judged_tell_no_verdicts(stored, tmp_path):
     settings, played = stored
-    run = replace(played, rows=[{**row, "breaches": None, "avoidable": None} for row in played.rows], folder=tmp_path)
+    run = replace(played, rows=[{**row, "violations": None, "avoidable": None} for row in played.rows], folder=tmp_path)
     results = results_of(run, settings)
     assert verdict_rows(results["pairings"][0]["verdicts"], str) == []
     assert all("avoidable" not in goal["name"] for goal in results["goals"])
-    assert all_breaches(run.rows) == []
+    assert all_violations(run.rows) == []
     write_results(run, results)
     assert "Not judged" in (tmp_path / "report.html").read_text()
 

@@ -30,7 +30,7 @@ def test_mirrored_water_gives_the_mirrored_command():
 @pytest.mark.parametrize("gap_m", [0.0, 0.1, 0.5, 1.0, 2.0, 2.4])
 @pytest.mark.parametrize("coordination", ["team", "per_boat"])
 @pytest.mark.parametrize("team", [(0, 1), (0, 0)])
-def test_the_margin_in_breach_is_how_far_inside_the_boats_are(gap_m, coordination, team):
+def test_the_margin_in_violation_is_how_far_inside_the_boats_are(gap_m, coordination, team):
     decision = Shield(coordination=coordination).decide(fleet_of([(0, 0, 0, 2), (0, gap_m, 180, 2)], team), AHEAD)[0]
     assert decision.safety_margin_m == pytest.approx(gap_m - KEPT_M)
     assert decision.slack_m == pytest.approx(KEPT_M - gap_m)

@@ -154,14 +154,14 @@ def test_a_fleet_that_does_not_fit_is_refused(name):
 def test_head_on_is_avoided_and_commands_pass_again(name):
     outcome = measure("head_on", name, n=8, seed=3, judge=False)
     changed = outcome.columns["changed_share"]
-    assert outcome.summary["breached"] == 0 < outcome.summary["unshielded_breached"]
+    assert outcome.summary["violated"] == 0 < outcome.summary["unshielded_violated"]
     assert (changed > 0.0).mean() > 0.5
     assert (changed < 1.0).all()
 
 
 def test_a_heron_keeps_off_a_rammer_by_the_table():
     summary = measure("rammer_1", "reach", n=6, seed=4, judge=False).summary
-    assert (summary["unshielded_breached"], summary["breached"]) == (6, 0)
+    assert (summary["unshielded_violated"], summary["violated"]) == (6, 0)
     assert summary["changed_percent"] < 95.0
 
 
@@ -296,6 +296,6 @@ def test_a_unicycle_keeps_the_radius_while_its_program_has_an_answer(name, gains
         return TextbookFilter(name, config, games, platforms, team, gains)
 
     played = play(draw(family, UNICYCLE, UNICYCLE, Conditions(), 3, 0, 16), make, Conditions())
-    relaxed, breached = (played.reason[:, :, 0] > 1).mean(axis=0), tally(played)["closest_m"] < 2.5
-    assert (relaxed[breached] > 0.0).all()
-    assert not breached.all()
+    relaxed, violated = (played.reason[:, :, 0] > 1).mean(axis=0), tally(played)["closest_m"] < 2.5
+    assert (relaxed[violated] > 0.0).all()
+    assert not violated.all()

@@ -50,7 +50,7 @@ def resident_mib(pid):
 
 
 def test_rate_delay_and_memory_of_three_against_three(fleet_file):
-    """Jitter p99.9 <= 10 ms, telemetry to command p99 <= 20 ms, memory flat, no breach of ours."""
+    """Jitter p99.9 <= 10 ms, telemetry to command p99 <= 20 ms, memory flat, no violation of ours."""
     truth, result = fleet_file.with_name("truth.npz"), fleet_file.with_name("deploy.json")
     memory = []
     with Demo(fleet_file, "medium", more=("--record", str(truth))) as water:

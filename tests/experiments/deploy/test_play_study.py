@@ -141,7 +141,7 @@ def play(part, folder):
         "minutes_played": (steps + 1) * float(meta["dt_s"]) / 60.0,
         "closest_mate_m": closest(at, team, 0, 0),
         "closest_opponent_m": closest(at, team, 0, 1),
-        **{key: truth[key] for key in ("captures", "tags", "let_go_s", "breaches")},
+        **{key: truth[key] for key in ("captures", "tags", "let_go_s", "violations")},
         "load_average_before": load_before,
         "load_average_after": os.getloadavg()[0],
         "runners": [{**outcome["figures"], **contract_of(Path(outcome["log"]))} for outcome in outcomes],
@@ -216,15 +216,15 @@ def stale(tick, limits):
     return found
 
 
-def circumstance(breach):
+def circumstance(violation):
     """What held our boats when it happened."""
-    if breach["after_run"]:
+    if violation["after_run"]:
         return "after the run"
-    return "nobody steered it" if max(breach["unsteered_s"]) > 0.0 else "+".join(breach["faults"]) or "no fault"
+    return "nobody steered it" if max(violation["unsteered_s"]) > 0.0 else "+".join(violation["faults"]) or "no fault"
 
 
 def show(capsys, *results):
-    """A line each for a person, with breaches, and the minutes with and without the shield."""
+    """A line each for a person, with violations, and the minutes with and without the shield."""
     lines = [""]
     for result in results:
         runners, part = result["runners"], result["part"]
@@ -234,11 +234,13 @@ def show(capsys, *results):
         lines.append(
             f"{part['name']}: {result['minutes_played']:.1f} min, shield {part['shielded']}, mates "
             f"{result['closest_mate_m']:.2f} m, opponents {result['closest_opponent_m']:.2f} m, "
-            f"{len(result['breaches'])} breaches, jitter p99.9 {worst['jitter_p999_s']:.1f} ms, read to sent p99 "
+            f"{len(result['violations'])} violations, jitter p99.9 {worst['jitter_p999_s']:.1f} ms, read to sent p99 "
             f"{worst['read_to_sent_p99_s']:.1f} ms, load {result['load_average_after']:.1f}, {stale} stale commands, "
             f"{same} of {decisions} replayed the same"
         )
-        kinds = Counter((circumstance(breach), breach["kind"], breach["verdict"]) for breach in result["breaches"])
+        kinds = Counter(
+            (circumstance(violation), violation["kind"], violation["verdict"]) for violation in result["violations"]
+        )
         lines += [f"   {number} x {', '.join(what)}" for what, number in sorted(kinds.items())]
     with capsys.disabled():
         sys.stdout.write("\n".join(lines) + "\n")
@@ -246,16 +248,18 @@ def show(capsys, *results):
 
 @pytest.mark.parametrize("part", [*PARTS, *FAULTY], ids=lambda part: part.name)
 def test_three_against_three(part, tmp_path, capsys):
-    """No breach of teammates, no avoidable one with opponents, every command within the freshness contract.
+    """No violation of teammates, no avoidable one with opponents, every command within the freshness contract.
 
     With faults: none while a boat hears us and is known.
     """
     result = played(part, tmp_path)
     show(capsys, result)
-    during = [breach for breach in result["breaches"] if not breach["after_run"]]
+    during = [violation for violation in result["violations"] if not violation["after_run"]]
     if part.faults:
         during = [b for b in during if not set(b["faults"]) & set(DEAF) and circumstance(b) != "nobody steered it"]
-    assert [breach for breach in during if breach["kind"] == "teammate" or breach["verdict"] != "unavoidable"] == []
+    assert [
+        violation for violation in during if violation["kind"] == "teammate" or violation["verdict"] != "unavoidable"
+    ] == []
     assert all(runner["commands_without_answer"] == runner["decided_otherwise"] == 0 for runner in result["runners"])
     assert part.faults or all(runner["decisions"] > 500 * part.minutes for runner in result["runners"])
 
@@ -271,6 +275,6 @@ def test_without_the_shield_the_same_policies_come_too_near_ten_times_as_often(t
     rates = {}
     for shielded in (True, False):
         chosen = [result for result in results if result["part"]["shielded"] == shielded]
-        breaches = sum(not breach["after_run"] for result in chosen for breach in result["breaches"])
-        rates[shielded] = breaches / sum(result["minutes_played"] for result in chosen)
+        violations = sum(not violation["after_run"] for result in chosen for violation in result["violations"])
+        rates[shielded] = violations / sum(result["minutes_played"] for result in chosen)
     assert rates[True] < 0.1 * rates[False]

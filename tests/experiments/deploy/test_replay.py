@@ -496,18 +496,18 @@ def test_codes_are_checked_with_the_key_and_another_program_is_named(tmp_path, t
 
 
 @pytest.mark.parametrize("shielded", [True, False])
-def test_breaches_that_happened_are_judged_and_drawn_when_asked_for(tmp_path, shielded):
+def test_violations_that_happened_are_judged_and_drawn_when_asked_for(tmp_path, shielded):
     write_log(tmp_path / "x.mcap", STEPS, header=HEADER, shielded=shielded)
     files = {name: tmp_path / f"out.{name}" for name in ("html", "json")}
     code, said = run(tmp_path / "x.mcap", "--judge", "--html", files["html"], "--json", files["json"])
     assert code == 0, said
     content = json.loads(files["json"].read_text())
     assert undocumented(content, KEYS["replay"]) == []
-    verdicts = {breach["verdict"] for breach in content["breaches"]}
+    verdicts = {violation["verdict"] for violation in content["violations"]}
     assert verdicts == (set() if shielded else {"avoidable"})
-    assert len(verdicts) == (content["breaches_opponent"] + content["breaches_teammate"] > 0)
+    assert len(verdicts) == (content["violations_opponent"] + content["violations_teammate"] > 0)
     assert (content["closest_opponent_m"] > 2.5) == shielded
     assert content["files"] == [str(files["html"])]
     assert "as it was" in files["html"].read_text()
     assert "closest teammate" in said
-    assert ("Breaches of 2.5 m" in said) == (not shielded)
+    assert ("Violations of 2.5 m" in said) == (not shielded)

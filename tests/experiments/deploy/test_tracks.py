@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 from logged_runs import NAMES, START_S, Encounter, header_of
-from steerclear.env.record import find_breaches, read_meta, validate
+from steerclear.env.record import find_violations, read_meta, validate
 from steerclear.experiments.deploy.tracks import GONE_S, TrackBuilder, placed, record_of
 from steerclear.shield import ShieldConfig
 from steerclear.shield.exceptions import LogError
@@ -43,10 +43,10 @@ def test_tracks_are_what_was_seen(run):
         assert np.nan_to_num(gap) == pytest.approx(0.0, abs=1e-6)
     for k in (0, 77, STEPS - 2):
         decisions = ticks[k].decisions
-        assert tracks.sent[k, 0] == pytest.approx(decisions.filtered.absolute(0, decisions.fleet.heading_rad[0]))
-        assert tracks.wanted[k, 1] == pytest.approx(decisions.nominal.absolute(1, decisions.fleet.heading_rad[1]))
+        assert tracks.filtered[k, 0] == pytest.approx(decisions.filtered.absolute(0, decisions.fleet.heading_rad[0]))
+        assert tracks.nominal[k, 1] == pytest.approx(decisions.nominal.absolute(1, decisions.fleet.heading_rad[1]))
         assert np.array_equal(tracks.reason[k], decisions.reason)
-        assert np.isnan(tracks.wanted[k, 2:]).all()  # nobody knows what opponents wanted
+        assert np.isnan(tracks.nominal[k, 2:]).all()  # nobody knows what opponents nominal
 
 
 def test_a_boat_nothing_was_heard_of_is_not_there(run):
@@ -61,7 +61,7 @@ def test_a_boat_nothing_was_heard_of_is_not_there(run):
     assert far[90, 3, L.X] > 1e5
     record = record_of(header, tracks)
     validate(record)
-    assert np.array_equal(record["breaches"], find_breaches(placed(tracks.states)[..., :2], PROMPT.separation_m))
+    assert np.array_equal(record["violations"], find_violations(placed(tracks.states)[..., :2], PROMPT.separation_m))
     assert record["position"][90, 3] == pytest.approx(tracks.states[59, 3, :2], abs=2.0 * GONE_S)
 
 

@@ -203,7 +203,7 @@ DRILLS = {
 
 
 @pytest.mark.parametrize("name", DRILLS)
-def test_a_fault_on_the_wire_is_told_in_time_and_brings_no_breach(name, tmp_path):
+def test_a_fault_on_the_wire_is_told_in_time_and_brings_no_violation(name, tmp_path):
     strike, told, within_s = DRILLS[name]
     with Lake(tmp_path, signed=name.startswith("a stranger")) as lake:
         closest_m, began_s = math.inf, lake.clock.now_s()
@@ -222,7 +222,7 @@ def test_a_fault_on_the_wire_is_told_in_time_and_brings_no_breach(name, tmp_path
     assert said.startswith(told.replace("_", " "))
     assert said_m == pytest.approx(closest_m, abs=2.0), "threads decide what is heard when: no two runs are alike"
     found = lake.proved()
-    assert found.judged["breaches"] == []
+    assert found.judged["violations"] == []
     assert told == "no_fix" or found.reasons.total() > found.reasons["PASSED"], "a boat that knows no place is stopped"
     kinds = {(message.get_type(), message.get_srcSystem(), message._link) for message in lake.raw()}
     assert {("GLOBAL_POSITION_INT", 1, 0), ("GLOBAL_POSITION_INT", 2, 0)} <= kinds

@@ -28,11 +28,11 @@ def test_no_attacker_starts_near_an_own_boat(own, attackers, own_boats):
 
 
 def test_a_search_finds_how_to_hit_a_boat_without_a_shield_and_its_scene_plays_again():
-    search = Search(guard="none", population=8, generations=2)
+    search = Search(filter="none", population=8, generations=2)
     answer = run_search(search)
-    assert answer["breached"] > 0
+    assert answer["violated"] > 0
     assert answer["judged"][-1]["avoidable"] > 0
-    assert answer["judged"][-1]["start_certificate_m"] > 0.0
+    assert answer["judged"][-1]["start_safety_margin_m"] > 0.0
     assert answer["judged"][-1]["responsible"] in SIDES
     scenes, conditions = scenes_of(json.loads(json.dumps(answer["scene"])))
     columns = measure_chunk(scenes, "none", conditions, judge=False)
@@ -42,7 +42,7 @@ def test_a_search_finds_how_to_hit_a_boat_without_a_shield_and_its_scene_plays_a
 
 def test_a_search_goes_on_while_nothing_is_found(monkeypatch):
     monkeypatch.setattr("steerclear.experiments.encounters.attack.judge_game", lambda film, game: NO_VERDICT)
-    answer = run_search(Search(guard="none", population=8, generations=3))
+    answer = run_search(Search(filter="none", population=8, generations=3))
     assert (answer["tried"], len(answer["history"]), answer["scene"]) == (24, 3, None)
     assert 3 < len(answer["judged"]) <= 9  # at most three a generation
     assert answer["history"] == sorted(answer["history"], reverse=True)

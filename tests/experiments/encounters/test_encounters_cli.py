@@ -39,18 +39,18 @@ def test_a_small_run_from_end_to_end_and_again():
     assert " not judged)" in Path("quick/report.html").read_text()
 
 
-def test_the_same_scenes_for_every_guard_and_exit_status_one_for_avoidable_breaches(monkeypatch):
-    monkeypatch.setattr(results, "measure_chunk", _breaching(results.measure_chunk))
+def test_the_same_scenes_for_every_guard_and_exit_status_one_for_avoidable_violations(monkeypatch):
+    monkeypatch.setattr(results, "measure_chunk", _violating(results.measure_chunk))
     done = run(*SMALL, "--guard", "none,shield", "--no-judge", "--out", "out")
     assert done.exit_code == ExitCode.GOAL_MISSED, done.output
     cells = json.loads(Path("out/results.json").read_text())["cells"]
-    bare = {(cell["guard"], cell["family"]): cell["unshielded_breached"] for cell in cells}
+    bare = {(cell["filter"], cell["family"]): cell["unshielded_violated"] for cell in cells}
     assert bare["none", "head_on"] == bare["shield", "head_on"]
 
 
-def _breaching(measure_chunk):
-    def measured(scenes, guard, conditions, judge):
-        columns = measure_chunk(scenes, guard, conditions, judge)
+def _violating(measure_chunk):
+    def measured(scenes, safety_filter, conditions, judge):
+        columns = measure_chunk(scenes, safety_filter, conditions, judge)
         columns["avoidable"] = np.ones_like(columns["avoidable"])
         return columns
 
@@ -60,7 +60,7 @@ def _breaching(measure_chunk):
 @pytest.mark.parametrize("family", ["rammer_2", "corner"])
 def test_a_game_of_a_film_is_a_record_within_its_bounds(family):
     film = play(draw(family, "heron", "heron", USUAL, 0, 0, 2), "none", USUAL)
-    record = record_of(film, 1, "a name", guarded=True)
+    record = record_of(film, 1, "a name", is_filtered=True)
     validate(record)
     meta = read_meta(record)
     assert meta["shielded"] == ["agent_0"]
@@ -69,7 +69,7 @@ def test_a_game_of_a_film_is_a_record_within_its_bounds(family):
         assert (record["position"] < np.array(meta["env_bounds_m"])).all()
     shift = record["position"] - film.state[:, 1, :, :2]
     np.testing.assert_allclose(shift, np.broadcast_to(shift[0, 0], shift.shape), atol=1e-9)
-    assert (record["breaches"][:, 1] == 0).all()
+    assert (record["violations"][:, 1] == 0).all()
 
 
 @pytest.mark.parametrize(
@@ -80,12 +80,12 @@ def test_goals_of_the_shield(avoidable, unavoidable, not_judged, expected):
     counts = {"avoidable": avoidable, "unavoidable": unavoidable, "not_judged": not_judged, "encounters": 100}
     cell = Cell("shield:straight_horizon_s=4", "heron", "heron", "rammer_2")._asdict() | counts
     assert [goal["met"] for goal in goals_of([cell])] == expected
-    assert goals_of([cell | {"guard": "parabolic"}]) == []
+    assert goals_of([cell | {"filter": "parabolic"}]) == []
 
 
 def test_the_table_of_a_thousand_encounters_cuts_nothing_off_at_80_columns():
-    counts = {"unshielded_breached": 1000, "started_outside": 1000, "never_arrived_percent": 41.7, "decision_us": 28.3}
-    names = ("breached", "avoidable", "not_judged", "unavoidable", "started_inside", "breaches_outside", "deadlocked")
+    counts = {"unshielded_violated": 1000, "started_outside": 1000, "never_arrived_percent": 41.7, "decision_us": 28.3}
+    names = ("violated", "avoidable", "not_judged", "unavoidable", "started_inside", "violations_outside", "deadlocked")
     means = dict.fromkeys(("closest_m", "goal_time_ratio"), 2.6) | {"avoidable_upper": 0.003}
     means |= dict.fromkeys(("changed_percent", "reversals_per_min"), 10.6)
     cell = Cell("shield", "heron", "heron", "crossing_right")._asdict() | dict.fromkeys(names, 0)

@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 import pytest
-from steerclear.env.record import find_breaches
+from steerclear.env.record import find_violations
 from steerclear.experiments.baselines.registry import NoFilter
 from steerclear.experiments.encounters import Conditions, draw, measure, play
 from steerclear.experiments.encounters.figures import summarise
@@ -16,7 +16,7 @@ from steerclear.experiments.encounters.outcomes import (
     measure_chunk,
     never_arrived,
     safe_boats,
-    start_certificate_m,
+    start_safety_margin_m,
     tally,
     worst_games,
 )
@@ -31,18 +31,18 @@ QUARTERS = (173, 189, 253, 397, 403, 437, 480, 498, 503, 627)
 """Encounters of a heron and two rammers, one on each quarter, that who takes them to hold their course loses."""
 
 
-def test_breaches_are_those_of_the_record():
+def test_violations_are_those_of_the_record():
     crowd_film = play(draw("crowd_6", "heron", "heron", USUAL, 2, 0, 3), "none", USUAL)
     counted = tally(crowd_film)
     for game in range(3):
         places = crowd_film.state[:, game, :, :2]
-        found = find_breaches(places, 2.5)
+        found = find_violations(places, 2.5)
         own = (found[:, 1] < 3).astype(int) + (found[:, 2] < 3)
-        assert counted["breaches_teammate"][game] == (own == 2).sum()
-        assert counted["breaches_opponent"][game] == (own == 1).sum()
+        assert counted["violations_teammate"][game] == (own == 2).sum()
+        assert counted["violations_opponent"][game] == (own == 1).sum()
         gaps = np.linalg.norm(places[1:, :3, None] - places[1:, None, 3:], axis=-1)
         assert counted["closest_opponent_m"][game] == pytest.approx(gaps.min())
-    assert counted["breaches_opponent"].sum() > 0
+    assert counted["violations_opponent"].sum() > 0
 
 
 def test_changes_are_counted_and_averaged_over_changed_steps():
@@ -68,17 +68,17 @@ def test_the_worst_variant_of_each_encounter_counts():
     np.testing.assert_array_equal(columns["variant"], every.argmin(axis=1))
 
 
-def test_an_unguarded_head_on_breach_is_judged_avoidable():
+def test_an_unguarded_head_on_violation_is_judged_avoidable():
     outcome = measure("head_on", "none", n=6, seed=0)
     figures = outcome.summary
-    assert figures["breached"] == figures["unshielded_breached"] == figures["avoidable"] > 0
+    assert figures["violated"] == figures["unshielded_violated"] == figures["avoidable"] > 0
     assert figures["not_judged"] == figures["unavoidable"] == 0
     assert (outcome.columns["last_preventable_s"][outcome.columns["avoidable"] > 0] > 0.0).all()
     assert figures["goal_time_ratio"] == 1.0
-    assert sum(figures["responsible"].values()) == figures["breached"]
+    assert sum(figures["responsible"].values()) == figures["violated"]
     assert figures["responsible"]["own"] + figures["responsible"]["both"] > 0
     unjudged = measure("head_on", "none", n=6, seed=0, judge=False).summary
-    assert (unjudged["avoidable"], unjudged["not_judged"]) == (0, figures["breached"])
+    assert (unjudged["avoidable"], unjudged["not_judged"]) == (0, figures["violated"])
 
 
 def test_a_late_command_has_to_be_given_so_much_earlier():
@@ -93,26 +93,26 @@ def test_a_late_command_has_to_be_given_so_much_earlier():
     assert SIDES[int(found[1.0]["responsible"])] == "opponent"  # whose commands act at once
 
 
-def test_the_certificate_at_the_start_is_the_one_of_the_first_decision():
+def test_the_safety_margin_at_the_start_is_the_one_of_the_first_decision():
     scenes = draw("rammer_1", "heron", "heron", USUAL, 0, 0, 6)
     scenes.state[0, 1, [L.X, L.Y]] = scenes.state[0, 0, [L.X, L.Y]] + np.array([2.6, 0.0])
     scenes = dataclasses.replace(scenes, length_s=0.1)
     film = play(scenes, "shield", USUAL)
-    found = start_certificate_m(film)
+    found = start_safety_margin_m(film)
     np.testing.assert_array_equal(found.astype(np.float32), film.safety_margin_m[0, :, 0])
-    np.testing.assert_array_equal(found, start_certificate_m(play(scenes, "none", USUAL)))
+    np.testing.assert_array_equal(found, start_safety_margin_m(play(scenes, "none", USUAL)))
     assert found[0] < 0.0
     assert (found[1:] > 0.0).all()
 
 
 def test_figures_of_made_up_encounters_take_what_nobody_judged_for_possibly_avoidable():
     columns = measure("head_on", "none", n=4, seed=0, judge=False).columns
-    columns["breaches_opponent"] = np.array([9.0, 1.0, 1.0, 0.0])
+    columns["violations_opponent"] = np.array([9.0, 1.0, 1.0, 0.0])
     columns |= {"unavoidable": np.array([5.0, 1, 0, 0]), "started_inside": np.array([0, 0, 1.0, 0])}
     columns |= {"not_judged": np.array([4.0, 0, 0, 0]), "avoidable": np.zeros(4)}
     columns["goal_s"] = 1.5 * columns["unshielded_goal_s"]
     figures = summarise(columns)
-    names = ("breached", "avoidable", "unavoidable", "started_inside", "not_judged")
+    names = ("violated", "avoidable", "unavoidable", "started_inside", "not_judged")
     assert [figures[name] for name in names] == [3, 0, 1, 1, 1]
     assert figures["avoidable_upper"] == upper_bound(1, 4)
     assert figures["goal_time_ratio"] == pytest.approx(1.5)
@@ -227,9 +227,9 @@ def test_a_boat_is_not_let_off_by_what_a_team_mate_far_away_cannot_keep(number):
     assert (told_m[both] >= 0.0).all()
 
 
-def closest_m(guard):
+def closest_m(safety_filter):
     scenes = draw("rammer_2", "heron", "heron", USUAL, 0, 0, max(QUARTERS) + 1).take(QUARTERS)
-    place = play(scenes, guard, USUAL).state[..., [L.X, L.Y]]
+    place = play(scenes, safety_filter, USUAL).state[..., [L.X, L.Y]]
     return np.linalg.norm(place[:, :, :1] - place[:, :, 1:], axis=-1).min(axis=(0, 2))
 
 
@@ -249,7 +249,7 @@ def short_film():
 
 
 @pytest.mark.parametrize(
-    ("guarded", "bare", "share"),
+    ("is_filtered", "bare", "share"),
     [
         ((9.0, 8.0, 7.0), (5.0, 5.0, 5.0), 0.0),
         ((NEVER, 8.0, NEVER), (5.0, 5.0, 5.0), 2.0 / 3.0),
@@ -257,16 +257,16 @@ def short_film():
         ((9.0, 8.0, 7.0), (NEVER, NEVER, NEVER), 0.0),
     ],
 )
-def test_own_boats_count_that_would_arrive_without_a_guard(short_film, guarded, bare, share):
+def test_own_boats_count_that_would_arrive_without_a_guard(short_film, is_filtered, bare, share):
     def arriving(first_goal_s):
         others = (NEVER, 5.0, NEVER)
         return dataclasses.replace(short_film, first_goal_s=np.array([(5.0,) * 6, (*first_goal_s, *others)]))
 
-    np.testing.assert_allclose(never_arrived(arriving(guarded), arriving(bare)), [0.0, share])
+    np.testing.assert_allclose(never_arrived(arriving(is_filtered), arriving(bare)), [0.0, share])
 
 
-def circling(guard):
-    return measure("circle_3", guard, "surveyor", "surveyor", n=6, seed=0, judge=False)
+def circling(safety_filter):
+    return measure("circle_3", safety_filter, "surveyor", "surveyor", n=6, seed=0, judge=False)
 
 
 def test_a_livelock_among_team_mates_is_seen_though_nobody_stands_still():
@@ -275,15 +275,15 @@ def test_a_livelock_among_team_mates_is_seen_though_nobody_stands_still():
     assert (lost > 0.0).any()
     assert (lost < 0.7).all(), "two sail on side by side, the third gets across"
     assert livelock.summary["never_arrived_percent"] == pytest.approx(100.0 * lost.mean())
-    assert livelock.summary["deadlocked"] == livelock.summary["breached"] == 0
-    assert livelock.summary["unshielded_breached"] == 6
+    assert livelock.summary["deadlocked"] == livelock.summary["violated"] == 0
+    assert livelock.summary["unshielded_violated"] == 6
     resolved = circling("shield").summary
-    assert resolved["never_arrived_percent"] == resolved["breached"] == 0
+    assert resolved["never_arrived_percent"] == resolved["violated"] == 0
     assert resolved["reached_percent"] == 100.0
 
 
 def test_without_a_guard_boats_cross_in_the_middle_and_all_arrive():
     outcome = measure("circle_6", "none", n=6, seed=0, judge=False)
-    assert outcome.summary["breached"] == 6
+    assert outcome.summary["violated"] == 6
     assert outcome.summary["reached_percent"] == 100.0
     assert not outcome.columns["never_arrived"].any()

@@ -85,8 +85,8 @@ def test_a_delayed_command_takes_effect_so_much_later():
     scenes = short(draw("head_on", "heron", "heron", USUAL, 1, 0, 1), 3.0)
     paths = []
     for delay_s in (0.0, 0.5):
-        guard = Recording(1, 2, turn_deg=60.0)
-        paths.append(play(scenes, guard, Conditions(delay_s=delay_s)).state[:, 0, :, L.HEADING])
+        safety_filter = Recording(1, 2, turn_deg=60.0)
+        paths.append(play(scenes, safety_filter, Conditions(delay_s=delay_s)).state[:, 0, :, L.HEADING])
     turned = [np.flatnonzero(path[:, 0] != path[0, 0])[0] for path in paths]
     assert turned == [1, 6]
     np.testing.assert_array_equal(paths[0][:, 1], paths[1][:, 1])  # others obey at once
@@ -113,7 +113,7 @@ def test_filters_by_name_are_told_of_the_conditions():
 
 def test_names_until_0_8_0_warn_and_give_the_same():
     played = play(short(draw("head_on", "heron", "heron", USUAL, 0, 0, 1), 0.1), "none", USUAL)
-    with pytest.warns(DeprecationWarning, match="Film is called Trajectory"):
+    with pytest.warns(DeprecationWarning, match="'Film' is now 'Trajectory'"):
         assert encounters.Film is encounters.Trajectory
     for old, new in (("wanted", "nominal"), ("sent", "filtered"), ("certificate_m", "safety_margin_m")):
         with pytest.warns(DeprecationWarning, match=f"{old} of a trajectory is called {new}"):
@@ -160,9 +160,9 @@ def test_the_current_carries_every_boat_alike():
 def test_position_errors_stay_within_the_bound_and_truth_is_untouched():
     conditions = Conditions(noise_m=0.8)
     scenes = short(draw("crowd_6", "heron", "heron", conditions, 1, 0, 4), 20.0)
-    guard = Recording(4, 6)
-    film = play(scenes, guard, conditions)
-    seen = np.array(guard.seen)
+    safety_filter = Recording(4, 6)
+    film = play(scenes, safety_filter, conditions)
+    seen = np.array(safety_filter.seen)
     error = np.linalg.norm(seen[..., :2] - film.state[:-1, ..., :2], axis=-1)
     assert error.max() <= 0.8 + 1e-9
     assert error.max() > 0.7

@@ -134,7 +134,7 @@ def test_a_report_of_an_entry_that_has_a_shield_or_of_other_rules_plays_no_zip(w
 
 
 def row(game, shielded, captures, against=0, opponents=0, mates=0, counted=0, own="us"):
-    hits = {"breaches_opponent_4.0m": opponents, "breaches_teammate_4.0m": mates, "collisions": counted}
+    hits = {"violations_opponent_4.0m": opponents, "violations_teammate_4.0m": mates, "collisions": counted}
     names = {"own": own, "pairing": f"{own} vs <them>", "opponent": "<them>", "game": game, "shielded": shielded}
     return {**names, **hits, "captures": captures, "captures_against": against}
 

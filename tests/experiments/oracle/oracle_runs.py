@@ -1,7 +1,7 @@
 """Runs of boats to be judged, made with the package's own dynamics; the oracle's model has no part in them."""
 
 import numpy as np
-from steerclear.env.record import find_breaches
+from steerclear.env.record import find_violations
 from steerclear.shield.platforms import fresh_state, get_platform, step_boat
 
 DT_S = 0.1
@@ -47,7 +47,7 @@ def random_run(name, boats, size_m, steps, seed, chasers=0):
     return np.array(rows), np.array([params] * boats)
 
 
-def first_breach(states, radius_m, pair=(0, 1)):
+def first_violation(states, radius_m, pair=(0, 1)):
     """Step at which a pair first comes within the radius; None when it never does."""
-    found = find_breaches(states[:, list(pair), :2], radius_m)
+    found = find_violations(states[:, list(pair), :2], radius_m)
     return int(found[0, 0]) if len(found) else None

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from oracle_runs import DT_S, random_run
-from steerclear.env.record import find_breaches
+from steerclear.env.record import find_violations
 from steerclear.experiments.oracle import Outcome, Settings, judge
 from steerclear.experiments.oracle.verdict import FULL
 from steerclear.shield.jit import kernel
@@ -85,13 +85,13 @@ def replayed(states, rows, verdict):
 
 
 def close_calls(name, seed, size_m, boats=3):
-    """Breaches of short runs in a small basin."""
+    """Violations of short runs in a small basin."""
     states, rows = random_run(name, boats, size_m, 150, seed, chasers=boats - 1)
-    return states, rows, [row for row in find_breaches(states[:, :, :2], RADIUS_M) if row[0] > 1]
+    return states, rows, [row for row in find_violations(states[:, :, :2], RADIUS_M) if row[0] > 1]
 
 
 def brute_last(states, rows, verdict, rudders, macro, back):
-    """Latest of the last ``back`` steps from which brute force avoids the breach; None when there is none."""
+    """Latest of the last ``back`` steps from which brute force avoids the violation; None when there is none."""
     others = np.ascontiguousarray(np.delete(states[:, :, :2], verdict.own, axis=1))
     for begin in range(verdict.step - 1, max(-1, verdict.step - 1 - back), -1):
         start = states[begin, verdict.own]
@@ -104,10 +104,10 @@ def brute_last(states, rows, verdict, rudders, macro, back):
 
 
 def compare(name, seed, size_m, rudders, macro, most, back=20):
-    """Judge the first breaches of a run both ways; returns how many were compared and found avoidable."""
-    states, rows, breaches = close_calls(name, seed, size_m)
+    """Judge the first violations of a run both ways; returns how many were compared and found avoidable."""
+    states, rows, violations = close_calls(name, seed, size_m)
     found = 0
-    for step, a, b, _ in breaches[:most]:
+    for step, a, b, _ in violations[:most]:
         for own, other in ((int(a), int(b)), (int(b), int(a))):
             verdict = judge(states, rows, own, int(step), RADIUS_M, other=other, settings=SHORT)
             last = brute_last(states, rows, verdict, rudders, macro, back)
@@ -139,10 +139,10 @@ def test_large_brute_force_finds_nothing_more(name, size_m, macro, back):
 def test_plans_hold_when_replayed_with_the_packages_boat(name):
     size_m = {"large_usv": 100.0, "di": 60.0}.get(name, 35.0)
     states, rows = random_run(name, 5, size_m, 900, seed=11, chasers=2)
-    breaches = [row for row in find_breaches(states[:, :, :2], RADIUS_M) if row[0] > 1][:8]
-    assert len(breaches) >= 3
+    violations = [row for row in find_violations(states[:, :, :2], RADIUS_M) if row[0] > 1][:8]
+    assert len(violations) >= 3
     checked = 0
-    for step, a, b, _ in breaches:
+    for step, a, b, _ in violations:
         verdict = judge(states, rows, int(a), int(step), RADIUS_M, other=int(b))
         if verdict.plan is None or not _apart(states, verdict):
             continue
@@ -169,10 +169,10 @@ def test_what_cannot_be_avoided_cannot_be_on_a_finer_search(name):
     # one step after the last preventable moment nothing was found: nothing is found there by a finer search either
     later = []
     for seed in range(8):
-        states, rows, breaches = close_calls(name, seed, {"heron": 18.0, "surveyor": 25.0}[name])
-        if not breaches:
+        states, rows, violations = close_calls(name, seed, {"heron": 18.0, "surveyor": 25.0}[name])
+        if not violations:
             continue
-        step, a, b = (int(value) for value in breaches[0][:3])
+        step, a, b = (int(value) for value in violations[0][:3])
         coarse = judge(states, rows, a, step, RADIUS_M, other=b, settings=Settings(look_back_s=8.0))
         fine = judge(states, rows, a, step, RADIUS_M, other=b, settings=Settings(look_back_s=8.0, full=FINER))
         later.append((fine.last_step or -1) - (coarse.last_step or -1))

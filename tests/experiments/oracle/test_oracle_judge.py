@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from oracle_runs import DT_S, driven_track, first_breach, straight_track
+from oracle_runs import DT_S, driven_track, first_violation, straight_track
 from steerclear.experiments import oracle
 from steerclear.experiments.oracle import (
     Boat,
@@ -21,7 +21,7 @@ from steerclear.experiments.oracle import (
     Responsible,
     Settings,
     judge,
-    judge_breach,
+    judge_violation,
 )
 from steerclear.experiments.oracle.boat_model import rows_of
 from steerclear.experiments.oracle.verdict import Level
@@ -41,7 +41,7 @@ def heron_towards(other, steps=200, start_m=(0.0, 0.0), speed_mps=2.0):
 
 def test_facts_of_a_verdict():
     states, rows = heron_towards([straight_track((0.5, 25.0), (0.0, 0.0), 200)])
-    step = first_breach(states, RADIUS_M)
+    step = first_violation(states, RADIUS_M)
     verdict = judge(states, rows, 0, step, RADIUS_M)
     assert (verdict.own, verdict.other, verdict.step, verdict.radius_m) == (0, 1, step, RADIUS_M)
     assert verdict.looked_back_s == pytest.approx(step * DT_S)
@@ -55,7 +55,7 @@ def test_facts_of_a_verdict():
 
 def test_avoidable_from_every_earlier_step():
     states, rows = heron_towards([straight_track((0.5, 25.0), (0.0, 0.0), 200)])
-    step = first_breach(states, RADIUS_M)
+    step = first_violation(states, RADIUS_M)
     last = judge(states, rows, 0, step, RADIUS_M).last_step
     for begin in (0, last - 20, last - 1, last):
         cut = judge(states[begin:], rows, 0, step - begin, RADIUS_M)
@@ -70,17 +70,17 @@ def test_a_third_boat_in_the_way_counts():
     ahead = straight_track((0.0, 25.0), (0.0, 0.0), 200)
     alone, rows = heron_towards([ahead])
     walled, many = heron_towards([ahead, *wall])
-    step = first_breach(alone, RADIUS_M)
+    step = first_violation(alone, RADIUS_M)
     free = judge(alone, rows, 0, step, RADIUS_M)
     held = judge(walled, many, 0, step, RADIUS_M, other=1)
     assert held.last_preventable_s is None or held.last_preventable_s > free.last_preventable_s + 1.0
 
 
-def test_a_contact_under_way_with_a_third_boat_is_another_breach():
+def test_a_contact_under_way_with_a_third_boat_is_another_violation():
     # boat 2 rides inside the radius all along: boat 1 must still be judged
     ahead, rider = straight_track((0.0, 25.0), (0.0, 0.0), 120), straight_track((1.0, 0.0), (0.0, 2.0), 120)
     states, rows = heron_towards([ahead, rider], steps=120)
-    step = first_breach(states, RADIUS_M)
+    step = first_violation(states, RADIUS_M)
     verdict = judge(states, rows, 0, step, RADIUS_M, other=1)
     assert verdict.outcome is Outcome.AVOIDABLE
     assert np.hypot(*(verdict.plan.path_m - [0.0, 25.0]).T).min() > RADIUS_M
@@ -88,7 +88,7 @@ def test_a_contact_under_way_with_a_third_boat_is_another_breach():
 
 def test_started_inside():
     states, rows = heron_towards([straight_track((0.0, 1.0), (0.0, 0.0), 60)], steps=60)
-    both = judge_breach(states, rows, (0, 1), 1, RADIUS_M)
+    both = judge_violation(states, rows, (0, 1), 1, RADIUS_M)
     assert both.first.outcome is both.second.outcome is Outcome.STARTED_INSIDE
     assert both.responsible is Responsible.START
     assert both.responsible_boats() == ()
@@ -108,7 +108,7 @@ def test_started_inside():
 )
 def test_who_had_the_later_last_chance_is_responsible_with_a_step_to_spare(first, second, expected):
     states, rows = heron_towards([straight_track((0.5, 25.0), (0.0, 0.0), 200)])
-    one = judge(states, rows, 0, first_breach(states, RADIUS_M), RADIUS_M)
+    one = judge(states, rows, 0, first_violation(states, RADIUS_M), RADIUS_M)
     one, other = replace(one, last_step=first), replace(one, own=1, other=0, last_step=second)
     assert Responsible.of(one, other, np.zeros((200, 2), dtype=bool)) is expected
 
@@ -116,12 +116,12 @@ def test_who_had_the_later_last_chance_is_responsible_with_a_step_to_spare(first
 def test_who_cannot_turn_or_brake_has_no_chance():
     """A point on a rail."""
     states, rows = heron_towards([straight_track((0.0, 40.0), (0.0, -2.0), 150)], steps=150)
-    step = first_breach(states, RADIUS_M)
+    step = first_violation(states, RADIUS_M)
     rail = get_platform("di").pack()
     rail[[1, 7, 19]] = 2.0, 0.0, 0.0
     states[:, 1, 2:4] = 180.0, 2.0
     for pair, responsible in (((0, 1), Responsible.FIRST), ((1, 0), Responsible.SECOND)):
-        both = judge_breach(states, np.array([rows[0], rail]), pair, step, RADIUS_M)
+        both = judge_violation(states, np.array([rows[0], rail]), pair, step, RADIUS_M)
         assert both.of(1).outcome is Outcome.UNAVOIDABLE
         assert (both.responsible, both.responsible_boats()) == (responsible, (0,))
 
@@ -136,10 +136,10 @@ def head_on(gap_m, steps):
 
 def test_both_of_a_symmetric_meeting_unless_driven():
     states, rows = head_on(40.0, 150)
-    step, driven = first_breach(states, RADIUS_M), np.zeros((150, 2), dtype=bool)
+    step, driven = first_violation(states, RADIUS_M), np.zeros((150, 2), dtype=bool)
     for boats, responsible in (([], Responsible.BOTH), ([1], Responsible.FIRST), ([0, 1], Responsible.GAME)):
         driven[:, boats] = True
-        both = judge_breach(states, rows, (0, 1), step, RADIUS_M, driven=driven)
+        both = judge_violation(states, rows, (0, 1), step, RADIUS_M, driven=driven)
         assert both.responsible is responsible
     assert both.responsible_boats() == ()
 
@@ -160,7 +160,7 @@ def slow_boat_upstream(steps=120):
 
 def test_a_boat_that_could_have_stayed_where_the_water_took_it():
     states, boats = slow_boat_upstream()
-    step = first_breach(states, RADIUS_M)
+    step = first_violation(states, RADIUS_M)
     told = judge(states, boats, 0, step, RADIUS_M, motion=Motion(CURRENT))
     assert told.outcome is Outcome.AVOIDABLE
     forgotten = judge(states, boats, 0, step, RADIUS_M)
@@ -169,7 +169,7 @@ def test_a_boat_that_could_have_stayed_where_the_water_took_it():
 
 def test_no_command_arrived_in_time():
     states, rows = head_on(12.0, 80)
-    step = first_breach(states, RADIUS_M)
+    step = first_violation(states, RADIUS_M)
     told = judge(states, rows, 0, step, RADIUS_M, motion=Motion(delay_steps=(20, 0)))
     assert (told.outcome, told.last_preventable_s, told.exhausted) == (Outcome.UNAVOIDABLE, None, True)
     forgotten = judge(states, rows, 0, step, RADIUS_M)
@@ -179,9 +179,9 @@ def test_no_command_arrived_in_time():
 
 def test_who_had_the_last_chance_is_a_matter_of_when_commands_were_given():
     states, rows = head_on(30.0, 120)
-    step = first_breach(states, RADIUS_M)
-    at_once = judge_breach(states, rows, (0, 1), step, RADIUS_M)
-    late = judge_breach(states, rows, (0, 1), step, RADIUS_M, motion=Motion(delay_steps=(5, 0)))
+    step = first_violation(states, RADIUS_M)
+    at_once = judge_violation(states, rows, (0, 1), step, RADIUS_M)
+    late = judge_violation(states, rows, (0, 1), step, RADIUS_M, motion=Motion(delay_steps=(5, 0)))
     assert (at_once.responsible, late.responsible) == (Responsible.BOTH, Responsible.SECOND)
     assert late.first.last_step == at_once.first.last_step - 5
     assert late.first.plan.begin_step == at_once.first.plan.begin_step
@@ -190,7 +190,7 @@ def test_who_had_the_last_chance_is_a_matter_of_when_commands_were_given():
 
 FILES = sorted(Path(oracle.__file__).parent.glob("*.py"))
 ALLOWED = {"__future__", "contextlib", "numpy", "numba", "math", "dataclasses", "enum", "typing", "collections",
-           "functools", "hashlib", "itertools", "logging", "pathlib"}  # fmt: skip
+           "functools", "hashlib", "itertools", "logging", "pathlib", "warnings"}  # fmt: skip
 BLOCKED = """
 import sys
 class Wall:
@@ -232,7 +232,7 @@ LEVEL = Level(5, (1.0,) * 5, (0.0,), ((0.5,),))
 def run():
     """Two boats on rails that meet; the parameters and the step of their violation."""
     states = np.stack([straight_track((0, 0), (0, 2.0), 90), straight_track((0, 12.0), (0, 0), 90)], axis=1)
-    return states, np.array([HERON.pack()] * 2), first_breach(states, 2.5)
+    return states, np.array([HERON.pack()] * 2), first_violation(states, 2.5)
 
 
 @pytest.mark.parametrize("place", [(3, 0, 0), (90, 1, 2)])
@@ -255,9 +255,9 @@ def test_states_that_are_not_finite_but_for_a_controller_that_has_not_run(run, p
         ({"radius_m": 0.0}, "radius_m is 0.0; give a positive"),
         ({"dt_s": -0.1}, "dt_s is -0.1; give a positive"),
         ({"own": 2}, r"no boat 2; the record's boats are 0..1"),
-        ({"other": 0}, "no breach"),
+        ({"other": 0}, "no violation"),
         ({"step": 0}, r"no step 0 to judge; the record's steps are 1..90"),
-        ({"step": 10}, "no breach of 2.5 m; give the first step inside"),
+        ({"step": 10}, "no violation of 2.5 m; give the first step inside"),
         ({"boats": np.array([HERON.pack()])}, "hold 2 boats but 1 parameter sets"),
         ({"motion": Motion(delay_steps=(5,))}, "one per boat"),
     ],
@@ -273,7 +273,7 @@ def test_questions_that_make_no_sense(run, changes, words):
 def test_marks_of_who_drove_that_do_not_fit(run, driven):
     states, rows, step = run
     with pytest.raises(OracleError, match="one row per step"):
-        judge_breach(states, rows, (0, 1), step, 2.5, driven=driven)
+        judge_violation(states, rows, (0, 1), step, 2.5, driven=driven)
 
 
 @pytest.mark.parametrize(

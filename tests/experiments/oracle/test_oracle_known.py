@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from oracle_runs import DT_S, driven_track, first_breach, straight_track
+from oracle_runs import DT_S, driven_track, first_violation, straight_track
 from steerclear.experiments.oracle import Outcome, judge
 from steerclear.shield.platforms import Platform, fresh_state
 from steerclear.shield.platforms.proving import reference_models
@@ -35,7 +35,7 @@ def test_last_stop_before_a_stopped_boat(speed_mps, max_acc):
     # braking v -> 0 with trapezoid steps takes exactly v^2 / 2a when v is a whole number of steps
     platform = straight_boat(10.0, max_acc=max_acc)
     states, rows = meeting(platform, (0.0, 0.0), speed_mps, straight_track((0.0, 40.0), (0.0, 0.0), 400), steps=400)
-    step = first_breach(states, RADIUS_M)
+    step = first_violation(states, RADIUS_M)
     verdict = judge(states, rows, 0, step, RADIUS_M)
     gap_m = 40.0 - states[:step, 0, 1]
     last = int(np.flatnonzero(gap_m - speed_mps**2 / (2 * max_acc) > RADIUS_M + 1e-8)[-1])
@@ -58,7 +58,7 @@ def test_turning_circle_past_a_stopped_boat(speed_mps, turn_dps, offset_m):
     circle_m = speed_mps / math.radians(turn_dps)
     other = straight_track((-offset_m, 25.0), (0.0, 0.0), 350)
     states, rows = meeting(dubins(speed_mps, turn_dps), (0.0, 0.0), speed_mps, other, steps=350)
-    step = first_breach(states, RADIUS_M)
+    step = first_violation(states, RADIUS_M)
     verdict = judge(states, rows, 0, step, RADIUS_M)
     needed_m = math.sqrt((circle_m + RADIUS_M) ** 2 - (circle_m + offset_m) ** 2)
     left_m = 25.0 - states[verdict.last_step, 0, 1]
@@ -74,7 +74,7 @@ def test_constant_speed_evader_against_a_straight_mover(mover_mps):
     start = meet_m - np.array(mover_mps) * 10.0
     other = straight_track(start, mover_mps, 200)
     states, rows = meeting(dubins(speed_mps, turn_dps), (0.0, 0.0), speed_mps, other, steps=200)
-    step = first_breach(states, RADIUS_M)
+    step = first_violation(states, RADIUS_M)
     verdict = judge(states, rows, 0, step, RADIUS_M)
     clear = [
         turn_then_straight(states[k, 0], other[k : verdict.end_step + 1, :2], speed_mps, turn_dps) for k in range(step)

@@ -46,19 +46,19 @@ def test_without_conditions_a_game_is_bit_for_bit_what_it_was(shield, monkeypatc
 def test_own_boats_obey_so_many_steps_later_and_all_are_carried(side, shield):
     """The one law of motion that the oracle takes a game to have: command of k steps ago, plus the way of the water."""
     match = Match(spec_of(replace(ALL, delay_s=0.25), side=side, shield=shield, judge="all", seed=1))
-    sent = match.play().record["filtered"]
+    filtered = match.play().record["filtered"]
     states, motion, params = match._log.states, match.shielding.motion, match.env.core.params
     assert motion.delay_steps == ((3, 3, 3, 0, 0, 0) if side == "blue" else (0, 0, 0, 3, 3, 3))
     assert np.hypot(*motion.current_mps) == pytest.approx(0.3)
     drift = 0.1 * np.array(motion.current_mps)
-    for k in range(len(sent)):
+    for k in range(len(filtered)):
         for i, late in enumerate(motion.delay_steps):
             moved = states[k, i].copy()
-            speed, course = sent[k - late, i] if k >= late else states[0, i, [L.SPEED, L.HEADING]]
+            speed, course = filtered[k - late, i] if k >= late else states[0, i, [L.SPEED, L.HEADING]]
             step_boat(params[i], moved, speed, (course - moved[L.HEADING] + 180.0) % 360.0 - 180.0, 0.1)
             moved[[L.X, L.Y]] += drift
             np.testing.assert_allclose(moved[: L.SPEED + 1], states[k + 1, i, : L.SPEED + 1], atol=1e-5)
-    changed = np.abs(np.diff(sent[:, :, 1], axis=0)) > 1.0
+    changed = np.abs(np.diff(filtered[:, :, 1], axis=0)) > 1.0
     assert changed[:, : 3 if side == "blue" else 6].any()
 
 
@@ -122,18 +122,18 @@ def test_the_other_teams_shield_is_not_told_of_a_delay_its_boats_do_not_have(sid
 
 
 def test_the_oracle_is_told_of_the_same_physics(monkeypatch):
-    told, ask = [], verdicts.oracle.judge_breaches
+    told, ask = [], verdicts.oracle.judge_violations
 
     def note(*args, motion, **kwargs):
         told.append(motion)
         return ask(*args, motion=motion, **kwargs)
 
-    monkeypatch.setattr(verdicts.oracle, "judge_breaches", note)
+    monkeypatch.setattr(verdicts.oracle, "judge_violations", note)
     match = Match(spec_of(ALL, seed=1, judge="all", rules={"max_time_s": 40.0}))
     row = match.play().row
     assert told == [match.shielding.motion]
     assert told[0].delay_steps == (3, 3, 3, 0, 0, 0)
-    assert row["breaches"]
+    assert row["violations"]
 
 
 def test_a_current_that_nobody_comes_back_against_is_refused():

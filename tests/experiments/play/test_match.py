@@ -7,7 +7,7 @@ from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.env.record import read_meta
 from steerclear.env.render import Arena, Picture, Scene
-from steerclear.env.render.boats import boats_in_breach
+from steerclear.env.render.boats import boats_in_violation
 from steerclear.experiments.cli_games import STEERING
 from steerclear.experiments.play.match import Match, play_match
 from steerclear.experiments.play.openings import GAP_M, opening
@@ -207,16 +207,16 @@ def test_the_first_boat_of_a_keyboard_team_is_steered(own, opponent, steered):
         match.close()
 
 
-def test_breaches_of_others_among_themselves_are_not_marked_where_boats_are_shielded(game_record):
+def test_violations_of_others_among_themselves_are_not_marked_where_boats_are_shielded(game_record):
     """Boats 2 and 3 are nobody's that is shielded: their picture is the same however close they are."""
     record = {name: array.copy() for name, array in game_record.items()}
     record["position"][:, 3] = record["position"][:, 2] + [0.0, 1.0]
     arena = Arena.from_meta(read_meta(record))
     scene = Scene.from_record(record, 20, 0.1)
-    assert (2, 3) in boats_in_breach(scene, arena.separation_m)
+    assert (2, 3) in boats_in_violation(scene, arena.separation_m)
     shielded, other = drawn(record), drawn(record, shielded=frozenset(["agent_2"]))
-    breach = np.array([190, 24, 147])
+    violation = np.array([190, 24, 147])
     count = [
-        int((rows.reshape(len(rows), -1, 4)[..., 2::-1] == breach).all(axis=2).sum()) for rows in (shielded, other)
+        int((rows.reshape(len(rows), -1, 4)[..., 2::-1] == violation).all(axis=2).sum()) for rows in (shielded, other)
     ]
     assert count[0] < count[1]

@@ -76,7 +76,7 @@ def test_the_record_is_a_games_and_the_oracle_judges_it(tmp_path):
         apart = np.linalg.norm(record["position"][:, pair[0]] - record["position"][:, pair[1]], axis=1)
         assert closest.distance_m == apart[1:].min()
         assert closest.time_s == pytest.approx(0.1 * (1 + int(apart[1:].argmin())))
-        inside = [row for row in record["breaches"] if row[3] <= 2.5]
+        inside = [row for row in record["violations"] if row[3] <= 2.5]
         judged = fleet.judge(0)
         assert len(judged) == sum(min(row[1], row[2]) < 3 for row in inside) > 0
         assert {entry["verdict"] for entry in judged} <= {"avoidable", "unavoidable", "started_inside"}
@@ -187,15 +187,15 @@ def test_a_runner_that_dies_does_not_end_the_run(gap_s, then, in_order):
     assert held_by(rows, len(rows), (2, 0))["after_run"] == in_order
 
 
-def test_breaches_of_a_simulated_game_carry_them():
+def test_violations_of_a_simulated_game_carry_them():
     boats = [SimBoat(f"b{i}", team=i // 2, start=(10.0 + i, 10.0, 0.0), policy="hold") for i in range(4)]
     fleet = SimFleet(boats, autopilot=READY, record=True, waits=False)
     fleet.fault("b0", "freeze", duration_s=1.0)
     fleet.advance(1.0)
-    breaches, commanded = fleet.judge(0), fleet.truth_record()["commanded"]
+    violations, commanded = fleet.judge(0), fleet.truth_record()["commanded"]
     fleet.close()
-    assert breaches
+    assert violations
     assert commanded.shape[1] == 4
     assert not commanded.any()
-    assert all(breach["unsteered_s"] == [0.0, 0.0] and not breach["after_run"] for breach in breaches)
-    assert any(breach["faults"] == ["freeze"] for breach in breaches)
+    assert all(violation["unsteered_s"] == [0.0, 0.0] and not violation["after_run"] for violation in violations)
+    assert any(violation["faults"] == ["freeze"] for violation in violations)

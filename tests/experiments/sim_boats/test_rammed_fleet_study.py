@@ -1,7 +1,7 @@
 """Boats fitted by the page's own commands among rammers: what their model misses is made up for.
 
-Three boats of ours cruise among three that ram them, on one clock moved by hand; breaches are by true places. What our
-boats are told they are and what they are differ; their autopilots are simulated, links and feed are real.
+Three boats of ours cruise among three that ram them, on one clock moved by hand; violations are by true places. What
+our boats are told they are and what they are differ; their autopilots are simulated, links and feed are real.
 """
 
 import logging
@@ -81,8 +81,8 @@ class Unheeded(Shield):
 
 
 @dataclass
-class Breaches:
-    """Breaches of the separation by true places: how many, and the least distance, m, with mates and with rammers."""
+class Violations:
+    """Violations of the separation by true places: how many, and the least distance, m, with mates and with rammers."""
 
     mates: int = 0
     opponents: int = 0
@@ -103,7 +103,7 @@ class Breaches:
 
 
 def sail(folder, told, true, minutes, seed, shielded):
-    """Breaches in that many minutes: boats ``told`` (a platform file) the shield, which are ``true``."""
+    """Violations in that many minutes: boats ``told`` (a platform file) the shield, which are ``true``."""
     fleet, clock = _fleet(folder, told), ManualClock(1000.0)
     water = SimFleet.from_file(
         fleet,
@@ -127,7 +127,7 @@ def sail(folder, told, true, minutes, seed, shielded):
         station.prepare(60.0)
     parts = Parts(station.links, Cruise(fleet.names, seed), contacts=(station.feed,), sinks=())
     shield = None if shielded else Unheeded(fleet.shield_config, fleet.surroundings)
-    loop, found = ControlLoop(fleet, parts, Operator(), clock, shield), Breaches()
+    loop, found = ControlLoop(fleet, parts, Operator(), clock, shield), Violations()
     for _ in range(round(60.0 * minutes / TURN_S)):
         loop.turn(clock.now_s())
         for _ in range(round(TURN_S / STEP_S)):

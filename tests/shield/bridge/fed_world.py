@@ -110,7 +110,7 @@ def fed_world(seed=0, key=None, attack=None):
 
 
 def count_hits(world):
-    """Note the closest approach of each pair of an own boat and another while it is a breach."""
+    """Note the closest approach of each pair of an own boat and another while it is a violation."""
     rows = {**{name: link.row for name, link in world.links.items()}, **world.contacts.rows}
     for own in world.links:
         for other, row in rows.items():
