@@ -23,7 +23,7 @@ from steerclear.env.record_file import (
 )
 from steerclear.shield.exceptions import TraceError
 from steerclear.shield.platforms.layout import HEADING, SPEED, X, Y
-from steerclear.shield.renamed import old_names
+from steerclear.shield.renamed import old_names, takes_old_keywords
 
 __all__ = [
     "ARRAYS",
@@ -151,6 +151,7 @@ class GameRecorder:
         self._rows = {name: [] for name in ARRAYS if name != "violations"}
         self._append(_state_of(view))
 
+    @takes_old_keywords({"wanted": "nominal", "sent": "filtered"})
     def step(
         self,
         view: Any,
@@ -185,6 +186,7 @@ class GameRecorder:
         }
         self._append(given | _state_of(view))
 
+    @takes_old_keywords({"breaches": "violations"})
     def finish(self, violations: Sequence[Sequence[float]] | np.ndarray = ()) -> Record:
         """Close the game and return the validated record.
 

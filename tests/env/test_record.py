@@ -169,6 +169,9 @@ def view_of(record, step):
     return SimpleNamespace(state=state, time_s=0.1 * step, **marks)
 
 
+REST = ("reason", "intervened", "safety_margin_m")
+
+
 def test_recording_step_by_step_gives_the_same_record_and_a_step_that_does_not_fit_leaves_it_whole(
     game_record, game_meta
 ):
@@ -181,11 +184,19 @@ def test_recording_step_by_step_gives_the_same_record_and_a_step_that_does_not_f
     with pytest.raises(TraceError, match=r"filtered has shape \(3, 2\), expected \(4, 2\)"):
         recorder.step(view_of(game_record, 1), np.zeros((4, 2)), np.zeros((3, 2)))
     for step in range(60):
-        commands = [
-            game_record[name][step] for name in ("nominal", "filtered", "reason", "intervened", "safety_margin_m")
-        ]
-        recorder.step(view_of(game_record, step + 1), *commands)
-    again = recorder.finish(game_record["violations"])
+        commands = [game_record[name][step] for name in ("nominal", "filtered", *REST)]
+        if step == 30:
+            with pytest.warns(DeprecationWarning, match="is now '(nominal|filtered)'"):
+                recorder.step(
+                    view_of(game_record, 31),
+                    wanted=commands[0],
+                    sent=commands[1],
+                    **dict(zip(REST, commands[2:], strict=True)),
+                )
+        else:
+            recorder.step(view_of(game_record, step + 1), *commands)
+    with pytest.warns(DeprecationWarning, match="'breaches' is now 'violations'"):
+        again = recorder.finish(breaches=game_record["violations"])
     for name in ARRAYS:
         np.testing.assert_array_equal(again[name], game_record[name])
 
