@@ -90,7 +90,7 @@ def _games(
 
 def _rows(line: str) -> list[tuple[str, Mapping[str, Any], str]]:
     entry = read_line(line)
-    return [] if entry is None else [(entry["job"], row, entry["code"]) for row in entry["rows"]]
+    return [] if entry is None else [(entry["job"], row, entry["code"]) for row in current_keys(entry["rows"])]
 
 
 def compare_runs(first: PlayedRun, second: PlayedRun, seed: int = 0) -> dict[str, Any]:

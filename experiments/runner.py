@@ -35,6 +35,7 @@ from typing import TYPE_CHECKING, Any
 
 from filelock import BaseFileLock
 from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.renamed import current_keys
 
 from .provenance import code_digest, machine, versions
 from .result_files import lock_folder, plain_value, read_json, told_settings, write_json, write_table, writing
@@ -241,7 +242,7 @@ def check_settings(folder: Path, settings: Mapping[str, Any]) -> None:
     """Refuse (ConfigError) to go on in a folder that was begun with others of these settings: it names them."""
     path = folder / EXPERIMENT_FILE
     content = read_json(path, "settings", "choose another --out") if path.exists() else {}
-    kept = content.get("settings") or {} if isinstance(content, dict) else {}
+    kept = current_keys(content.get("settings") or {}) if isinstance(content, dict) else {}
     here = json.loads(json.dumps(told_settings(settings), default=plain_value))
     before, now = _flat({name: kept[name] for name in here if name in kept}), _flat(here)
     others = [name for name in {**now, **before} if before.get(name) != now.get(name)]

@@ -86,6 +86,14 @@ def test_games_of_one_seed_are_pairs_and_only_those_count(folders):
     assert found["differs"] == {"shield.separation_m": [2.5, 4.0], "shield.profile": [None, "ramming"]}
 
 
+def test_hits_of_an_earlier_version_are_compared_under_their_earlier_names(folders, tmp_path):
+    rows = [row("easy", game, True) for game in range(3)]
+    rows = [{name.replace("violations", "breaches"): value for name, value in one.items()} for one in rows]
+    earlier = write_run(tmp_path / "c", [one | {"breaches_opponent_2.5m": 2} for one in rows])
+    metrics = compare_runs(read_run(earlier), read_run(folders[1]))["pairings"][0]["metrics"]
+    assert metrics["violations_opponent_2.5m"]["difference"]["value"] == -2.0
+
+
 def test_games_without_a_shield_are_compared_where_there_are_no_others(folders, tmp_path):
     bare = write_run(tmp_path / "c", [row("easy", 0, False, captures=4)], states=[False])
     found = compare_runs(read_run(bare), read_run(folders[1]))

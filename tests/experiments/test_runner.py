@@ -140,6 +140,14 @@ def test_other_settings_are_refused_by_name_and_more_of_the_same_go_on(tmp_path)
         execute(with_settings(begun, 0, 1), tmp_path, resume=True)
 
 
+def test_settings_of_an_earlier_version_are_compared_under_their_present_names(tmp_path):
+    execute(Experiment("test", {"filters": ["shield"], "games": 2}, jobs("", ""), work), tmp_path)
+    path = tmp_path / "experiment.json"
+    path.write_text(path.read_text().replace("filters", "guards"))
+    with pytest.raises(ConfigError, match=r"\(games was 2, is 1\)"):
+        execute(Experiment("test", {"filters": ["shield"], "games": 1}, jobs("slow"), work), tmp_path, resume=True)
+
+
 def test_rows_without_their_settings_are_not_replaced(tmp_path):
     settings = {f"s{k}": k for k in range(6)}
     execute(Experiment("test", settings, jobs("", ""), work), tmp_path)
