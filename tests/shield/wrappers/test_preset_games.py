@@ -17,7 +17,7 @@ from steerclear.shield.wrappers import ShieldedParallelEnv, games_shield
 from steerclear.shield.wrappers.game_facts import facts_of_games
 
 LOG = logging.getLogger(__name__)
-KEPT_M, GAMES = 2.5, 100
+KEPT_M, GAMES, FIRST_SEED = 2.5, 100, 0
 
 
 UNLIKE = {"aamas2024": ("heron", "heron", "surveyor") * 2, "mctf2025": ("surveyor", "surveyor", "heron") * 2}
@@ -26,8 +26,8 @@ UNLIKE = {"aamas2024": ("heron", "heron", "surveyor") * 2, "mctf2025": ("surveyo
 
 def played(preset, opponent, games, longest=np.inf, own="medium", **settings):
     """(games, 5): entries of teammates and of opponents, captures for and against, share of commands changed."""
-    core = BatchedMctf(GameConfig.preset(preset, default_start=False, **settings), games, 0)
-    core.reset(seed=0)
+    core = BatchedMctf(GameConfig.preset(preset, default_start=False, **settings), games, FIRST_SEED)
+    core.reset(seed=FIRST_SEED)
     teams = [policies.make_batch(own), policies.make_batch(opponent)]
     for number, team in enumerate(teams):
         team.reset(core, number, number)
