@@ -188,11 +188,10 @@ def decide_times(games: Games, config: ShieldConfig, repeats: int) -> dict[str, 
     }
 
 
-@kernel
-def _check(scene: Scene) -> int:
-    """Run only the nominal check; return the number of groups of boats that fail it."""
+def _check(scene: Scene) -> None:
+    """Run only the nominal check: two calls of what is compiled, a microsecond more than one."""
     load_decision(0, scene)
-    return begin(scene)
+    begin(scene)
 
 
 def stage_times(games: Games, config: ShieldConfig, repeats: int) -> list[dict[str, Any]]:

@@ -44,6 +44,7 @@ def code_digest() -> str:
     return digest.hexdigest()[:16]
 
 
+@cache
 def package_version(name: str = "steerclear") -> str | None:
     """Return the installed version of a distribution, None where it is not installed."""
     try:

@@ -9,6 +9,7 @@ number again and again, which is no interval: ratios and differences of counts t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -41,11 +42,11 @@ class Interval:
 NAN = float("nan")
 
 
-def _distributions() -> Any:
-    """SciPy's: importing them takes half a second, which commands without intervals do not need."""
-    from scipy import stats
+def _special() -> Any:
+    """SciPy's quantiles, the functions behind `scipy.stats`, which takes half a second to import."""
+    from scipy import special
 
-    return stats
+    return special
 
 
 def share_interval(successes: int, trials: int) -> Interval:
@@ -54,8 +55,11 @@ def share_interval(successes: int, trials: int) -> Interval:
         raise ConfigError(f"a share needs 0 <= successes <= trials; got {successes} of {trials}")
     if trials == 0:
         return Interval(NAN, 0.0, 1.0)
-    limits = _distributions().binomtest(successes, trials).proportion_ci(CONFIDENCE, method="wilson")
-    return Interval(successes / trials, float(limits.low), float(limits.high))
+    share, z = successes / trials, float(_special().ndtri(1.0 - TAIL))
+    scale = 2.0 * (trials + z**2)
+    centre = (2.0 * trials * share + z**2) / scale
+    reach = z / scale * math.sqrt(4.0 * trials * share * (1.0 - share) + z**2)
+    return Interval(share, centre - reach if successes else 0.0, centre + reach if successes < trials else 1.0)
 
 
 def count_interval(events: int, exposure: float = 1.0) -> Interval:
@@ -71,8 +75,7 @@ def count_interval(events: int, exposure: float = 1.0) -> Interval:
         raise ConfigError(f"a rate needs events >= 0 and exposure > 0; got {events} over {exposure}")
     if events == 0:
         return Interval(0.0, 0.0, -np.log1p(-CONFIDENCE) / exposure)
-    low = _distributions().chi2.ppf(TAIL, 2 * events) / 2.0
-    high = _distributions().chi2.ppf(1.0 - TAIL, 2 * (events + 1)) / 2.0
+    low, high = _special().gammaincinv([events, events + 1], [TAIL, 1.0 - TAIL])
     return Interval(events / exposure, float(low) / exposure, float(high) / exposure)
 
 
@@ -89,9 +92,7 @@ def student_interval(values: ArrayLike) -> Interval:
     mean = float(found.mean()) if len(found) else NAN
     if len(found) < 2 or np.ptp(found) == 0.0:
         return Interval(mean, NAN, NAN)
-    reach = float(
-        _distributions().t.ppf(0.5 + 0.5 * CONFIDENCE, len(found) - 1) * found.std(ddof=1) / np.sqrt(len(found))
-    )
+    reach = float(_special().stdtrit(len(found) - 1, 1.0 - TAIL) * found.std(ddof=1) / np.sqrt(len(found)))
     return Interval(mean, mean - reach, mean + reach)
 
 
@@ -129,8 +130,8 @@ def count_ratio_interval(off: int, on: int) -> Interval:
     if off == on == 0:
         return Interval(NAN, 0.0, infinite)
     tail = TAIL if off and on else 2.0 * TAIL
-    low = float(_distributions().beta.ppf(tail, on, off + 1)) if on else 0.0
-    high = float(_distributions().beta.ppf(1.0 - tail, on + 1, off)) if off else 1.0
+    low = float(_special().betaincinv(on, off + 1, tail)) if on else 0.0
+    high = float(_special().betaincinv(on + 1, off, 1.0 - tail)) if off else 1.0
     low, high = (share / (1.0 - share) if share < 1.0 else infinite for share in (low, high))
     return Interval(on / off if off else infinite, low, high)
 
@@ -187,7 +188,7 @@ def upper_bound(events: int, trials: int) -> float:
     """One-sided upper limit of a probability (Clopper and Pearson 1934); 1 without trials."""
     if trials == 0 or events >= trials:
         return 1.0
-    return float(_distributions().beta.ppf(CONFIDENCE, events + 1, trials - events))
+    return float(_special().betaincinv(events + 1, trials - events, CONFIDENCE))
 
 
 def figure(table: pd.DataFrame, metric: Metric, seed: int = 0) -> tuple[Interval, int]:

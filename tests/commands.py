@@ -1,9 +1,13 @@
 """Commands as a user types them."""
 
+from functools import cache
+
+import typer.testing
 from steerclear.experiments import cli
-from typer.testing import CliRunner
+
+typer.testing._get_command = cache(typer.testing._get_command)  # it takes longer than most commands do in tests
 
 
 def run(*words, **options):
     """Run a command of ``steerclear`` in this process; its outcome."""
-    return CliRunner().invoke(cli.app, [str(word) for word in words], **options)
+    return typer.testing.CliRunner().invoke(cli.app, [str(word) for word in words], **options)

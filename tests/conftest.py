@@ -1,6 +1,8 @@
 """Fixtures that several folders of tests share."""
 
+import gc
 import logging
+import os
 import subprocess
 import sys
 import threading
@@ -20,16 +22,39 @@ REASONS = ["PASSED", "QP", "QP_RELAXED", "BACKUP", "BEST_EFFORT", "HELD", "NOT_C
 COMPILING = "from steerclear.experiments.warming import compile_share; compile_share({}, {})"
 
 
+def cores():
+    """Cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers(config):
+    """Workers of ``-n auto``: one more than cores, since tests of boats and of other processes often wait."""
+    return cores() + 1
+
+
 def pytest_configure(config):
-    """Compile before workers start (``-n``), a share in each of as many processes: they would else do it twice."""
+    """Compile before workers start (``-n``), a share in a process of each core: they would else do it several times."""
     workers = getattr(config.option, "numprocesses", None) or 0
     if workers < 2 or hasattr(config, "workerinput") or config.option.collectonly:
         return
     if config.option.dist == "load":  # neighbours share fixtures: each worker takes a stretch, and helps when done
         config.option.dist = "worksteal"
-    shares = [subprocess.Popen([sys.executable, "-c", COMPILING.format(k, workers)]) for k in range(workers)]
+    n = min(workers, cores())
+    shares = [subprocess.Popen([sys.executable, "-c", COMPILING.format(k, n)]) for k in range(n)]
     for share in shares:  # what goes wrong is for the tests to tell
         share.wait()
+
+
+def pytest_collection(session):
+    """Collect tests without looking for garbage meanwhile: nothing of what is made then can go."""
+    gc.disable()
+
+
+def pytest_collection_finish(session):
+    """Look for garbage from now on, among what tests make alone."""
+    gc.freeze()
+    gc.enable()
 
 
 class Stall:

@@ -77,14 +77,15 @@ def _make_active(
             return INFEASIBLE, count
         if full_step != np.inf:
             z += step * direction
-        dual[:count] -= step * r[:count]
+        for i in range(count):
+            dual[i] -= step * r[i]
         own += step
         if step == full_step:
             active[count], dual[count] = entering, own
             return OPTIMAL, count + 1
         count -= 1
-        active[leaving:count] = active[leaving + 1 : count + 1].copy()
-        dual[leaving:count] = dual[leaving + 1 : count + 1].copy()
+        for i in range(leaving, count):
+            active[i], dual[i] = active[i + 1], dual[i + 1]
     return STALLED, count
 
 

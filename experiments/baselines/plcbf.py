@@ -29,7 +29,7 @@ import math
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from steerclear.shield.jit import Array, kernel
+from steerclear.shield.jit import Array, copy_row, kernel
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.step import step_boat
 from steerclear.shield.platforms.usv import wrap_degrees
@@ -112,7 +112,7 @@ def value_of(setup: R.Setup, i: int, start: Array, k: int, speed: float, heading
 @kernel
 def answer_of(row: Array, need: float, box: Array, z0: Array, z: Array) -> bool:
     """Write the inputs nearest to ``z0`` within the box with ``row z >= need``; return whether there are any."""
-    z[:] = z0
+    copy_row(z, z0)
     length = math.hypot(row[0], row[1])
     if row[0] * z0[0] + row[1] * z0[1] >= need:
         return True
@@ -181,7 +181,7 @@ def take_mode(
             better = score > best_score + SAME or (score >= best_score - SAME and better)
         if best < 0 or better:
             best, best_need, best_value, best_score = m, need, value, score
-            row[:] = trial
+            copy_row(row, trial)
         if value > 0.0 and row[0] * z0[0] + row[1] * z0[1] >= best_need and best_score >= 1.0 - SAME:
             break  # removes no inputs: no other mode can be better
     return best, best_need, best_value

@@ -19,7 +19,7 @@ from numba.extending import intrinsic
 
 from ..exceptions import ConfigError
 from ..foreign import plain_text
-from .registry import Barrier
+from .registry import Barrier, Margin, Slope
 
 DIFFERENCE_M = 0.05
 """Half the distance of central differences where no gradient is given, m."""
@@ -27,25 +27,26 @@ DIFFERENCE_M = 0.05
 PLAIN = bool(getattr(config, "DISABLE_JIT", False))
 _NUMBER, _WHOLE = types.float64, types.int64
 _SIGNATURE = _NUMBER(_NUMBER, _NUMBER, _NUMBER, types.CPointer(_NUMBER), _WHOLE, _WHOLE)
-_MADE: dict[Barrier, tuple[int, Any]] = {}
+_MADE: dict[tuple[Margin, Slope | None], tuple[int, Any]] = {}
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 
 
 def address_of(barrier: Barrier) -> int:
-    """Return the address of a barrier's function in this process.
+    """Return the address of a barrier's function in this process, the same for whatever values it is registered with.
 
     Raises:
         ConfigError: the compiler rejects the function.
     """
-    if barrier not in _MADE:
+    functions = barrier.margin, barrier.slope
+    if functions not in _MADE:
         try:
-            _MADE[barrier] = _made(barrier)
+            _MADE[functions] = _made(barrier)
         except (NumbaError, UnsupportedBytecodeError, TypeError, ValueError, NotImplementedError) as error:
             raise ConfigError(
                 f"the compiler does not take barrier {barrier.name!r} ({_why(error)}); write it with numbers, arrays "
                 "and math only, as a plain function, and decorate what it calls with numba.njit"
             ) from None
-    return _MADE[barrier][0]
+    return _MADE[functions][0]
 
 
 def _why(error: Exception) -> str:

@@ -51,18 +51,21 @@ def test_a_batch_plays_each_game_bit_for_bit_as_a_single_game(seed):
     single = BatchedMctf(RANDOM, n_games=1, seed=0)
     watched = (0, 63, 64, 69)
     starts = {b: (batch.state[b].copy(), batch.games.rng[b]) for b in watched}
+    actions = [random_actions(1000 * seed + t, 70, 4) for t in range(80)]
     tracks = {b: [] for b in watched}
-    for t in range(80):
-        batch.step(random_actions(1000 * seed + t, 70, 4))
+    for step in actions:
+        batch.step(step)
         for b in watched:
-            tracks[b].append({name: getattr(batch, name)[b].copy() for name in NAMES})
+            tracks[b].append([getattr(batch, name)[b].copy() for name in NAMES])
     for b in watched:
         single.games.rng[0] = starts[b][1]
         place_as(single, starts[b][0])
-        for t in range(80):
-            single.step(random_actions(1000 * seed + t, 70, 4)[b : b + 1])
-            for name in NAMES:
-                np.testing.assert_array_equal(getattr(single, name)[0], tracks[b][t][name], err_msg=name)
+        alone = []
+        for step in actions:
+            single.step(step[b : b + 1])
+            alone.append([getattr(single, name)[0].copy() for name in NAMES])
+        for name, mine, its in zip(NAMES, zip(*alone, strict=True), zip(*tracks[b], strict=True), strict=True):
+            np.testing.assert_array_equal(np.array(mine), np.array(its), err_msg=name)
 
 
 def place_as(core, state):

@@ -130,17 +130,17 @@ def test_however_a_run_ends_what_is_finished_is_kept_and_gone_on_with(tmp_path, 
     monkeypatch.chdir(tmp_path)
     begin = ["ablate", "--opponents", "hold", "--max-time", "4", "--no-shield-autopilot", "--judge", "none", "--games"]
     command = [sys.executable, "-m", "steerclear.experiments.cli", *begin, "4000"]
-    running = {
-        name: subprocess.Popen(
+    whole = run(*begin, "2", "--jobs", "1", "--out", "whole")
+    assert whole.exit_code == ExitCode.OK, whole.output
+    expected = json.loads(Path("whole", "results.json").read_text())
+    for name, jobs in (("SIGINT", "1"), ("SIGKILL", "2")):
+        process = subprocess.Popen(
             [*command, "--jobs", jobs, "--out", name], stderr=subprocess.PIPE, preexec_fn=_heed_ctrl_c
         )
-        for name, jobs in (("SIGINT", "1"), ("SIGKILL", "2"))
-    }
-    for name, process in running.items():
         lines, deadline = tmp_path / name / "rows.jsonl", time.monotonic() + 300.0
         while not (lines.exists() and lines.read_bytes().count(b"\n") >= 2):
             assert time.monotonic() < deadline
-            time.sleep(0.1)
+            time.sleep(0.02)
         busy = run(*begin, "2", "--jobs", "1", "--out", name, "--resume")
         assert "is being written to by another process; wait until it is done" in busy.stderr
         workers = children_of(process.pid)
@@ -148,11 +148,7 @@ def test_however_a_run_ends_what_is_finished_is_kept_and_gone_on_with(tmp_path, 
         assert len(workers) >= (2 if name == "SIGKILL" else 0)
         while any(Path(f"/proc/{pid}/exe").exists() for pid in workers):
             assert time.monotonic() < deadline, "no worker is left"
-            time.sleep(0.1)
-    whole = run(*begin, "2", "--jobs", "1", "--out", "whole")
-    assert whole.exit_code == ExitCode.OK, whole.output
-    expected = json.loads(Path("whole", "results.json").read_text())
-    for name, process in running.items():
+            time.sleep(0.02)
         _, errors = process.communicate(timeout=300.0)
         assert process.returncode == ENDS[name], errors
         if name == "SIGINT":
