@@ -140,7 +140,11 @@ def run_bench(settings: BenchSettings, notice: Callable[[str], None] = lambda wo
     notice("memory")
     content["memory"] = batch_memory(settings.preset, settings.memory_games, shield)
     notice("decisions for more boats")
-    content["scaling"] = [_scaled(settings, platform, boats, shield) for platform in PAIR for boats in settings.counts]
+    content["scaling"] = [
+        scaled(shield, platform, boats, max(3, settings.scenes * min(settings.counts) // boats), seed)
+        for platform in PAIR
+        for boats in settings.counts
+    ]
     content["settings"] = asdict(settings)
     goals = bench_goals(content)
     return {**head_of("bench", asdict(settings), started), **content, "goals": goals}
@@ -152,11 +156,6 @@ def _policy_times(settings: BenchSettings, preset: str, policy: str, shield: Shi
     times = decide_times(games, shield, settings.repeats)
     about = {"preset": preset, "policy": policy, "decisions": times["decisions"]}
     return {**about, "share_intervening": times["share_intervening"], **times["all"]}
-
-
-def _scaled(settings: BenchSettings, platform: str, boats: int, shield: ShieldConfig) -> dict[str, Any]:
-    scenes = max(3, settings.scenes * min(settings.counts) // boats)
-    return scaled(shield, platform, boats, scenes, settings.seed)
 
 
 def bench_goals(content: Mapping[str, Any]) -> list[dict[str, Any]]:

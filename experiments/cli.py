@@ -20,7 +20,7 @@ from .terminal import prepare
 
 COMMANDS = {
     **dict.fromkeys(("play", "evaluate", "ablate"), "cli_games"),
-    **{"compare": "cli_tools", "tournament": "cli_tournament"},
+    **{"compare": "cli_tools", "tournament": "cli_games"},
     **dict.fromkeys(("train", "export"), "cli_train"),
     **dict.fromkeys(("encounters", "attack"), "cli_encounters"),
     **dict.fromkeys(("parity", "bench", "render", "docs", "warm-up"), "cli_tools"),

@@ -1,4 +1,4 @@
-"""Commands that play games: play, evaluate, ablate; what they share."""
+"""Commands that play games: play, evaluate, ablate, tournament; what they share."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from steerclear.policies.registry import KEYBOARD
 from steerclear.shield.exceptions import ConfigError, PolicyError
 
 from . import cli_options as o
+from . import tournament as cup
 from .ablation import AblationSettings, held_games, replay_of, results_of, write_results
 from .ablation import quick as small_version
 from .console import command, finish, out, progress, say, warn
@@ -26,17 +27,27 @@ from .play.match import MatchResult, play_match
 from .play.spec import MatchSpec, check_shield
 from .policy_checks import check_run, made_of
 from .provenance import head_of
+from .rankings import SCRIPTED, all_tables
 from .replay_html import check_endings, save_record
 from .result_files import NEW, write_json
 from .runner import Run
-from .tables import COVERED_WORDS, STATE_WORDS, covered_table, game_table, goals_table, pairing_table, verdict_table
+from .tables import (
+    COVERED_WORDS,
+    STATE_WORDS,
+    covered_table,
+    game_table,
+    goals_table,
+    pairing_table,
+    titled,
+    verdict_table,
+)
 from .verdicts import check_judge
 
 FEW_GAMES = 20
 """Fewer of a pairing give intervals that say little."""
 MOST_GAMES = 100_000
 """Games of a pairing at most: all are listed before the first is played."""
-QUICK_GAMES, QUICK_TIME_S = 4, 300.0
+QUICK_GAMES, QUICK_TIME_S, QUICK_CUP_TIME_S = 4, 300.0, 120.0
 OFF_WORDS = "the shield is off; add --shield"
 HITS_WORDS = (
     f"A hit is an entry into the radius: one stay within {RADII_M[1]:g} m may hold several\ninto {RADII_M[0]:g} m."
@@ -98,7 +109,10 @@ def play(
         warn(STEERING)
     human = look.window or KEYBOARD in names
     o.check_used({"--speed": look.speed != WindowOptions.speed and not human}, "no window is shown; add --window")
-    result = play_match(spec, _until_closed, "human", look.speed) if human else _played(spec)
+    if human:
+        result = play_match(spec, lambda env: not (env.renderer and env.renderer.window_closed), "human", look.speed)
+    else:
+        result = _played(spec)
     row = result.row
     out().print(game_table(row, spec.radii_m))
     if row["first_failure"]:
@@ -143,10 +157,6 @@ def _played(spec: MatchSpec) -> MatchResult:
             return True
 
         return play_match(spec, watch)
-
-
-def _until_closed(env: MctfEnv) -> bool:
-    return env.renderer is None or not env.renderer.window_closed
 
 
 @command()
@@ -306,3 +316,83 @@ def show(results: dict[str, Any], folder: Path) -> None:
             f"Intervals of {settings['games']} games per pairing say little: those of means are drawn from "
             f"these games alone. Ask for {FEW_GAMES} and more."
         )
+
+
+@dataclass(frozen=True)
+class CupOptions:
+    """Who meets whom, how often, and who is shielded."""
+
+    teams: Annotated[str, o.option("A,B", "Teams: names or submissions' paths, separated by commas.")] = ",".join(
+        SCRIPTED
+    )
+    shield: Annotated[
+        list[str] | None,
+        o.option("WHO", "off, all, or teams with commas; may be repeated.", "--shield", default="off, all"),
+    ] = None
+    repetitions: Annotated[int, o.option("N", "Times each pair meets on each side.")] = 1
+    seed: o.Seed = 0
+    quick: o.Quick = False
+    judge: o.Judge = "shielded"
+
+
+@command()
+def tournament(
+    who: CupOptions,
+    game: o.RuleOptions,
+    kept: o.ShieldOptions,
+    how: o.PlayOptions,
+    where: o.RunOptions,
+    check: o.Check = False,
+) -> None:
+    """Let teams meet each other on both sides, with the shield and without; tables beside the paper's, report, replays.
+
+    Exit status: 0 done, 1 a goal is not met (with --check), 2 bad input or a team that never played, 130 interrupted.
+    """
+    settings = cup.TournamentSettings(
+        teams=o.split_names(who.teams, "--teams"),
+        preset=game.preset,
+        states=tuple(who.shield or (cup.OFF, cup.ALL)),
+        repetitions=who.repetitions,
+        seed=who.seed,
+        judge=check_judge(who.judge),
+        shield=kept.of_game(game.preset, game.given()),
+        rules=game.given(),
+        **how.given(),
+    )
+    check_penalty(settings.penalty)
+    if who.quick:
+        settings = replace(settings, rules={"max_time_s": QUICK_CUP_TIME_S, **settings.rules})
+    shielded = set(settings.states) - {cup.OFF}
+    if not shielded:  # hits are counted at the separation anyhow
+        unused = dict.fromkeys(kept.given(), True) | {"separation_m": False}
+        o.check_used(unused, "no team is shielded; add --shield all")
+    experiment, workers = settings.experiment(), where.workers()
+    config = MatchSpec.of_job(experiment.jobs[0]).config()
+    check_shield(settings.shield, config)
+    check_run(settings.teams, config, settings.shield if shielded else None, warn, trust=settings.trust)
+    run = where.run(experiment)
+    results = cup.results_of(run, settings)
+    if run.rows:
+        links = [] if run.interrupted else cup.write_most_changed(run, settings, workers)
+        results["files"] |= {"report": "report.html"} | ({"replay": "replay.html"} if links else {})
+        cup.write_html(results, run.folder / "report.html", links)
+        run.write(results)
+    _show_cup(results, run.folder)
+    if not run.interrupted:
+        where.copy(results)
+    run.end()
+    if results["silent"]:
+        names = ", ".join(results["silent"])
+        raise PolicyError(f"{names} gave no usable answer throughout some game; mend it or leave it out")
+    finish(not check or met(results))
+
+
+def _show_cup(results: dict[str, Any], folder: Path) -> None:
+    say(f"{cup.subtitle(results)}\n", *(f"WARNING: {words}\n" for words in results["warnings"]))
+    for table in all_tables(results):
+        out().print(titled(table.title, table.heads, table.rows), "")
+    if results["goals"]:
+        out().print(goals_table(results["goals"]))
+    for one in results["failed"]:
+        say(f"not played: {one['blue']} against {one['red']}, {one['state']}: {one['error']}")
+    say(*(folder / name for name in results["files"].values()))

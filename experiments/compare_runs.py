@@ -72,25 +72,21 @@ def _games(
     found: dict[tuple[Any, ...], Mapping[str, Any]] = {}
     keys: dict[tuple[Any, ...], str] = {}
     code = set()
-    for name, row, digest in (entry for line in lines for entry in _rows(line)):
+    entries = filter(None, map(read_line, lines))
+    for entry, row in ((entry, row) for entry in entries for row in current_keys(entry["rows"])):
         if row["own"] != settings["own"] or row["opponent"] not in settings["opponents"] or row["seed"] not in seeds:
             continue
         if row["shielded"] is not shielded or (settings.get("covered") and row["covered"]):  # beside the state on
             continue
         game = tuple(row[part] for part in GAME)
-        if keys.setdefault(game, name) != name:
+        if keys.setdefault(game, entry["job"]) != entry["job"]:
             raise ConfigError(
                 f"{path} holds games of several settings, or of a policy before its files changed; play into a folder "
                 "of its own (--out)"
             )
         found[game] = row
-        code.add(digest)
+        code.add(entry["code"])
     return pd.DataFrame([*found.values()]), frozenset(code)
-
-
-def _rows(line: str) -> list[tuple[str, Mapping[str, Any], str]]:
-    entry = read_line(line)
-    return [] if entry is None else [(entry["job"], row, entry["code"]) for row in current_keys(entry["rows"])]
 
 
 def compare_runs(first: PlayedRun, second: PlayedRun, seed: int = 0) -> dict[str, Any]:

@@ -17,7 +17,6 @@ from steerclear.env.mctf import MctfEnv
 from steerclear.policies.protocol import TeamPolicy
 from steerclear.shield.barriers.registry import Barrier, get_barrier
 from steerclear.shield.exceptions import SteerclearError
-from steerclear.shield.fleet import Fleet
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import Platform, fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L
@@ -106,17 +105,14 @@ def check_reader(make_env: Callable[[], Any]) -> None:
         plain.step(plain_reader.playable(actions))
         with reader.filtering(passing):
             filtered.step(reader.playable(actions))
-        _hold_same(plain_reader.fleet(0, True), reader.fleet(0, True), n)
+        fleet, same = plain_reader.fleet(0, True), reader.fleet(0, True)
+        _hold(len(fleet.names) == n and bool(np.isfinite(fleet.state[:, : L.SPEED + 1]).all()), "a fleet lacks boats")
+        _hold(np.array_equal(fleet.state, same.state), "the game is another one under a filter that changes nothing")
         moments.add(reader.moment())
     _hold(len(moments) == STEPS + 1, "moment() is the same after a step; give the game's time")
     _hold(bool(seen) and all(c.shape == (n, 2) for c in seen), f"filtering hands over no commands of shape ({n}, 2)")
     for team in (0, 1):
         reader.surroundings(team, True)
-
-
-def _hold_same(plain: Fleet, filtered: Fleet, n: int) -> None:
-    _hold(len(plain.names) == n and bool(np.isfinite(plain.state[:, : L.SPEED + 1]).all()), "a fleet lacks boats")
-    _hold(np.array_equal(plain.state, filtered.state), "the game is another one under a filter that changes nothing")
 
 
 def check_barrier(name: str, area_m: tuple[float, float, float, float] = (-100.0, -100.0, 100.0, 100.0)) -> None:

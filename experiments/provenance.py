@@ -19,7 +19,7 @@ NO_GAME = (
     "shield/bridge/",
     "env/render/",
     "experiments/sim_boats/",
-    *(f"experiments/{name}.py" for name in ("docs", "docs_encounters", "markdown", "page", "plots")),
+    *(f"experiments/{name}.py" for name in ("docs", "markdown", "page", "plots")),
     *(f"experiments/{name}.py" for name in ("report", "replay_html", "tables", "terminal")),
     *(f"experiments/{name}" for name in ("cli", "console")),
 )

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 import steerclear.shield
-from steerclear.experiments.entries.package import LEFT_OUT, ONBOARD, STAND_INS
+from steerclear.experiments.entries.wrap import LEFT_OUT, ONBOARD, STAND_INS
 
 ROOT = Path(steerclear.shield.__file__).parent.parent
 FOLDERS = ("shield", "env", "policies", "experiments")
@@ -89,7 +89,7 @@ def imported_names(module):
 
 @pytest.mark.parametrize(("place", "stand_in"), STAND_INS.items())
 def test_a_stand_in_has_what_others_import_of_what_it_stands_for(place, stand_in):
-    """In shielded zips, see `steerclear.experiments.entries.package`."""
+    """In shielded zips, see `steerclear.experiments.entries.wrap`."""
     assert (ROOT / "shield" / place).is_file()
     tree = ast.parse((ONBOARD / "stand_ins" / stand_in).read_text(encoding="utf-8"))
     known = {node.name for node in tree.body if isinstance(node, ast.FunctionDef | ast.ClassDef)}

@@ -297,7 +297,8 @@ def decide_game(setup: Setup, game: Games) -> None:
             if ours[i] and (filtered[i, 0] != asked[i, 0] or filtered[i, 1] != asked[i, 1]):
                 reason[i] = LEAST_CHANGE
     elif moved:
-        filtered[:] = asked
+        for i in range(n):
+            copy_row(filtered[i], asked[i])
         while moved:  # boats below their target because of the new backups take one, too
             _take_backups(setup, game, pairs, movers)
             copy_row(h, margins(setup, pairs, ahead(setup, state, ours, filtered, 1)))

@@ -17,7 +17,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from steerclear.shield.jit import Array, kernel
+from steerclear.shield.jit import Array, copy_row, kernel
 from steerclear.shield.platforms import Platform, step_boat
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.actuator import actuate, command_for_turn, largest_turn
@@ -112,10 +112,14 @@ def solve(C: Array, d: Array, hard: int, z0: Array, z: Array, slack: Array) -> i
     if project(C, d, z0, z) == OPTIMAL and holds(C, d, z, TOLERANCE):
         return SOLVED
     wide, start, answer = np.zeros((rows, n + rows - hard)), np.zeros(n + rows - hard), np.zeros(n + rows - hard)
-    wide[:, :n], start[:n], z[:] = C, z0, z0
-    for r in range(hard, rows):
-        wide[r, n + r - hard] = unit
+    copy_row(start, z0)
+    copy_row(z, z0)
+    for r in range(rows):
+        copy_row(wide[r], C[r])
+        if r >= hard:
+            wide[r, n + r - hard] = unit
     if project(wide, d, start, answer) != OPTIMAL or not holds(wide, d, answer, TOLERANCE):
         return UNSOLVED
-    z[:], slack[:] = answer[:n], unit * answer[n:]
+    copy_row(z, answer[:n])
+    copy_row(slack, unit * answer[n:])
     return RELAXED

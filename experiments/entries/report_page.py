@@ -18,8 +18,7 @@ from ..report import Report, Section
 from ..statistics import paired_difference
 from ..tables import Table, interval_text
 from ..workers import Row
-from .package import game_spec
-from .wrap import own_files, shielded_files, write_zip
+from .wrap import game_spec, own_files, shielded_files, write_zip
 
 if TYPE_CHECKING:
     import pandas as pd

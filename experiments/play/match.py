@@ -26,10 +26,9 @@ from ..entries.team import make_team
 from ..game_metrics import reason_counts, scores, tally
 from ..verdicts import StateLog, judge_game, verdict_columns
 from ..workers import Workers, outcomes
-from .openings import opening
 from .policy_runner import PolicyRunner
 from .shielding import Seen, Shielding, shield_game
-from .spec import SIDES, MatchSpec
+from .spec import SIDES, MatchSpec, opening
 
 Watcher = Callable[[MctfEnv], bool]
 """Called after every step with the env; False ends the game early (a closed window)."""

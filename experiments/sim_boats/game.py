@@ -11,8 +11,8 @@ from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
 from steerclear.env.mctf import MctfEnv
-from steerclear.experiments.play.openings import opening
 from steerclear.experiments.play.policy_runner import PolicyRunner
+from steerclear.experiments.play.spec import opening
 from steerclear.policies.registry import ENTRIES
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array

@@ -5,7 +5,7 @@ import re
 import pytest
 import typer
 from steerclear.experiments.cli import app
-from steerclear.experiments.cli_examples import EXAMPLES, RARE
+from steerclear.experiments.console import EXAMPLES, RARE
 from typer.testing import CliRunner
 
 SCREEN = 50

@@ -1,8 +1,7 @@
 """Pages of results: the comparison of filters, the price, the keys of JSON; what no page can be made of."""
 
 import pytest
-from steerclear.experiments.docs import KEYS, price_page, write_pages
-from steerclear.experiments.docs_encounters import best_of, comparison_page, pool
+from steerclear.experiments.docs import KEYS, best_of, comparison_page, pool, price_page, write_pages
 from steerclear.shield.exceptions import ConfigError
 
 SETTINGS = {"radius_m": 2.5, "delay_s": 0.0, "noise_m": 0.0, "current_mps": 0.0, "seed": 7}

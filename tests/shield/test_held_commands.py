@@ -11,7 +11,7 @@ from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
 from steerclear.env.mctf import MctfEnv
 from steerclear.experiments.entries.onboard.state import GameSpec, Observation, fleet_of
-from steerclear.experiments.entries.package import game_spec
+from steerclear.experiments.entries.wrap import game_spec
 from steerclear.shield import Commands, Fleet, Shield, ShieldConfig
 from steerclear.shield.batch import BatchedShield
 from steerclear.shield.exceptions import ConfigError

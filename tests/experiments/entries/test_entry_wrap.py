@@ -22,7 +22,7 @@ from steerclear.env.mctf import MctfEnv
 from steerclear.experiments.console import ExitCode
 from steerclear.experiments.entries.onboard.state import GameSpec
 from steerclear.experiments.entries.onboard.team_shield import ShieldedTeam, _tuples
-from steerclear.experiments.entries.package import STAND_INS, code, game_spec
+from steerclear.experiments.entries.wrap import STAND_INS, code, game_spec
 from steerclear.policies.submissions.made_for import made_for
 from steerclear.shield import Commands, Fleet, Shield, ShieldConfig, Surroundings
 from steerclear.shield.exceptions import ConfigError

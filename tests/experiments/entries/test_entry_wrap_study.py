@@ -11,8 +11,7 @@ import pytest
 from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
-from steerclear.experiments.entries.package import game_spec
-from steerclear.experiments.entries.wrap import shielded_files
+from steerclear.experiments.entries.wrap import game_spec, shielded_files
 from steerclear.shield import Shield, ShieldConfig
 from steerclear.shield.platforms import layout as L
 

@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 import pytest
 from steerclear import policies
-from steerclear.experiments.entries.package import game_spec
+from steerclear.experiments.entries.wrap import game_spec
 from steerclear.experiments.play.match import Match
 from steerclear.experiments.play.spec import MatchSpec
 from steerclear.shield import Shield, ShieldConfig

@@ -10,8 +10,7 @@ from steerclear.env.render import Arena, Picture, Scene
 from steerclear.env.render.boats import boats_in_violation
 from steerclear.experiments.cli_games import STEERING
 from steerclear.experiments.play.match import Match, play_match
-from steerclear.experiments.play.openings import GAP_M, opening
-from steerclear.experiments.play.spec import MatchSpec
+from steerclear.experiments.play.spec import GAP_M, MatchSpec, opening
 from steerclear.policies.entrants.play import EntrantTeam
 from steerclear.policies.keyboard import AHEAD, BACK, LEFT, RIGHT
 from steerclear.shield.exceptions import ConfigError

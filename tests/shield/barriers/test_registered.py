@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from shield_loops import sail
 from steerclear.experiments.conformance import NotConforming, check_barrier
-from steerclear.experiments.entries.package import game_spec
+from steerclear.experiments.entries.wrap import game_spec
 from steerclear.shield import Commands, Fleet, Reason, Shield, ShieldConfig, Surroundings, arrays
 from steerclear.shield.backup.paths import SAG_M
 from steerclear.shield.barriers import Barrier, register_barrier, registry
