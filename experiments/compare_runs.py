@@ -73,7 +73,7 @@ def _games(
     keys: dict[tuple[Any, ...], str] = {}
     code = set()
     entries = filter(None, map(read_line, lines))
-    for entry, row in ((entry, row) for entry in entries for row in current_keys(entry["rows"])):
+    for entry, row in ((one, row) for one in entries for row in current_keys(one["rows"])):
         if row["own"] != settings["own"] or row["opponent"] not in settings["opponents"] or row["seed"] not in seeds:
             continue
         if row["shielded"] is not shielded or (settings.get("covered") and row["covered"]):  # beside the state on

@@ -144,7 +144,7 @@ def test_whatever_a_policy_does_calls_return_at_once_and_say_what_is_the_matter(
         until(lambda answer: words in answer.fault)  # noqa: B023
         until(answered)
         assert process.restarts == number
-    assert np.median(spent_s) < 0.02
+    assert np.median(spent_s) < 0.05
     assert max(spent_s) < 1.0, "no call waited for the policy or for its end"
 
 
