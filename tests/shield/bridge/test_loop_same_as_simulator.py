@@ -55,7 +55,7 @@ def simulate(fleet, late_steps):
 def run_loop(fleet, late_steps):
     """The loop on links whose boats obey ``late_steps`` late."""
     game = FakeGame(lambda k: game_of(blue_taken=100 <= k < 220))
-    world = World(fleet, OWN, lambda snapshot: wanted_at(snapshot.number + 1), OTHERS, game=game, grounds=GROUNDS)
+    world = World(fleet, OWN, lambda snapshot: wanted_at(snapshot.number + 1), OTHERS, game=game, surroundings=GROUNDS)
     world.policy.offer(Snapshot(-1, world.clock.now_s(), np.full((6, 4), np.nan)))
     for link in world.links.values():
         _delay(link, late_steps)
