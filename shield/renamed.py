@@ -139,6 +139,16 @@ class Renamed(dict[str, Any]):
         warn(key, new, stacklevel=2)
         return self[new]
 
+    def __contains__(self, key: object) -> bool:
+        return super().__contains__(key) or (isinstance(key, str) and super().__contains__(current_key(key)))
+
+    def get(self, key: str, default: Any = None) -> Any:
+        """As of any dict, and for earlier keys."""
+        if super().__contains__(key) or key not in self:
+            return super().get(key, default)
+        warn(key, current_key(key), stacklevel=2)
+        return self[current_key(key)]
+
 
 def takes_old_keywords(keywords: Mapping[str, str]) -> Callable[[F], F]:
     """Let a function be called with the old names of some keywords, old name to new; each use warns."""

@@ -261,8 +261,14 @@ def test_names_of_0_9_are_read_and_answered_with_a_warning(game_record, tmp_path
             with pytest.warns(DeprecationWarning, match=f"'{name}' is now '{new}'") as caught:
                 np.testing.assert_array_equal(record[name], game_record[new])
             assert caught[0].filename == __file__
+            with pytest.warns(DeprecationWarning, match=f"'{name}' is now '{new}'") as caught:
+                np.testing.assert_array_equal(record.get(name), game_record[new])
+            assert caught[0].filename == __file__
+            assert name in record
     with pytest.raises(KeyError, match="told"):
         game_record["told"]
+    assert "told" not in game_record
+    assert game_record.get("told", 1) == 1
     arrays = {name: values for name, values in old.items() if name != "meta"}
     assert set(make_record(read_meta(old), **arrays)) == set(game_record)
 
