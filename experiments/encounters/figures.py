@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import BoolArray
+from steerclear.shield.renamed import Renamed, takes_old_keywords
 
 from ..baselines.registry import SHIELD, FilterMaker
 from ..statistics import upper_bound
@@ -147,6 +148,7 @@ class Outcome:
     summary: dict[str, Any]
 
 
+@takes_old_keywords({"guard": "safety_filter"})
 def measure(
     family: str,
     safety_filter: str | FilterMaker = SHIELD,
@@ -184,7 +186,7 @@ def measure(
         for k in range(first, first + n, size)
     ]
     columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    return Outcome(columns, summarise(columns))
+    return Outcome(Renamed(columns), Renamed(summarise(columns)))
 
 
 WORST = {

@@ -16,6 +16,7 @@ from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms import step_boat
 from steerclear.shield.platforms.actuator import command_for_turn
 from steerclear.shield.platforms.usv import wrap_degrees
+from steerclear.shield.renamed import takes_old_keywords
 
 from ..baselines.registry import FilterMaker, SafetyFilter, build_filter
 from ..play.conditions import observe
@@ -212,6 +213,7 @@ class Trajectory:
         return getattr(self, names[name])
 
 
+@takes_old_keywords({"guard": "safety_filter"})
 def play(scenes: Scenes, safety_filter: str | FilterMaker | SafetyFilter, conditions: Conditions) -> Trajectory:
     """Play scenes with a safety filter for the own boats: a name, what makes one, or one made for just these games.
 

@@ -68,6 +68,17 @@ def test_the_worst_variant_of_each_encounter_counts():
     np.testing.assert_array_equal(columns["variant"], every.argmin(axis=1))
 
 
+def test_names_of_0_9_are_taken_and_answered_with_a_warning():
+    with pytest.warns(DeprecationWarning, match="'guard' is now 'safety_filter'"):
+        outcome = measure("head_on", guard="none", n=2, seed=0, judge=False)
+    with pytest.warns(DeprecationWarning, match="'guard' is now 'safety_filter'"):
+        play(draw("head_on", "heron", "heron", USUAL, 0, 0, 1), guard="none", conditions=USUAL)
+    with pytest.warns(DeprecationWarning, match="'breached' is now 'violated'"):
+        assert outcome.summary["breached"] == outcome.summary["violated"]
+    with pytest.warns(DeprecationWarning, match="'breaches_opponent' is now"):
+        assert outcome.columns["breaches_opponent"] is outcome.columns["violations_opponent"]
+
+
 def test_an_unguarded_head_on_violation_is_judged_avoidable():
     outcome = measure("head_on", "none", n=6, seed=0)
     figures = outcome.summary
