@@ -16,7 +16,7 @@ from steerclear import policies
 from steerclear.env.mctf import MctfEnv
 from steerclear.policies.protocol import TeamPolicy
 from steerclear.shield.barriers.registry import Barrier, get_barrier
-from steerclear.shield.exceptions import SteerclearError
+from steerclear.shield.exceptions import ConfigError, SteerclearError
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import Platform, fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L
@@ -120,6 +120,8 @@ def check_barrier(name: str, area_m: tuple[float, float, float, float] = (-100.0
 
     It is tried in ``area_m`` (xmin, ymin, xmax, ymax), up to a minute ahead.
     """
+    if not (np.shape(area_m) == (4,) and area_m[0] < area_m[2] and area_m[1] < area_m[3]):
+        raise ConfigError(f"area_m is {area_m!r}; give (xmin, ymin, xmax, ymax), m")
     barrier, random = get_barrier(name), np.random.default_rng(1)
     values, h, off = _values(barrier), 0.05, list[bool]()
     _hold(len(values) == len(_values(barrier)), f"values of barrier {name!r} are not as many each time; give as many")

@@ -48,7 +48,7 @@ EXAMPLES = {
     "compare": "steerclear compare results/before results/after",
     "deploy": "steerclear deploy --demo --policy medium",
     "docs": "steerclear docs results/mine --out docs/studies",
-    "encounters": "steerclear encounters --family rammer_1 --n 100 --guard none,shield",
+    "encounters": "steerclear encounters --family rammer_1 --n 100 --filter none,shield",
     "entry check": "steerclear entry check my_entry.zip",
     "entry report": "steerclear entry report my_entry.zip --quick",
     "entry wrap": "steerclear entry wrap my_entry.zip --out shielded.zip",

@@ -308,7 +308,8 @@ def _closest(games: Sequence[Mapping[str, Any]], separation_m: float) -> Plot:
 
 def _reasons(pairings: Sequence[Summary]) -> Plot:
     """Why commands were changed, as shares of all commands the shield decided."""
-    names = [name for name in dict.fromkeys(n for p in pairings for n in p["reasons"]) if name.lower() != "passed"]
+    counted = dict.fromkeys(name for p in pairings for name, count in p["reasons"].items() if count)
+    names = [name for name in counted if name.lower() != "passed"]
     groups = [
         (p["pairing"], [(name, 100.0 * p["reasons"].get(name, 0) / total) for name in names])
         for p in pairings

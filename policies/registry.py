@@ -13,6 +13,7 @@ from typing import Any
 from steerclear.shield.exceptions import PolicyError
 
 from .entrants import entrants
+from .entrants.catalogue import RESERVED
 from .keyboard import KeyboardTeam, Keys
 from .own import check_own, load_own, own_code
 from .protocol import BatchPolicy, TeamPolicy
@@ -125,6 +126,7 @@ HIDDEN = "hidden"
 SB3_PREFIX = "sb3:"
 WEIGHTS_PREFIX = "weights:"
 """Prefix of files that ``steerclear export`` wrote. They hold numbers only, so loading one runs no code."""
+RESERVED.update((*ENTRIES, KEYBOARD))
 KEYBOARD_DESCRIPTION = "a human drives one boat in render mode 'human' (agent=..., others='medium')"
 
 

@@ -10,7 +10,7 @@ from warnings import warn
 
 import numpy as np
 from numpy.typing import NDArray
-from steerclear.shield.exceptions import FleetError
+from steerclear.shield.exceptions import ConfigError, FleetError
 from steerclear.shield.jit import Array, IntArray, kernel
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms import step_boat
@@ -221,7 +221,7 @@ def play(scenes: Scenes, safety_filter: str | FilterMaker | SafetyFilter, condit
     in the batch.
 
     Raises:
-        SteerclearError: the filter cannot be made, or what it sends is not finite.
+        SteerclearError: the filter cannot be made, says no reason or margin, or what it sends is not finite.
     """
     decider: Any = safety_filter
     if isinstance(safety_filter, str) or not hasattr(safety_filter, "decide"):
@@ -251,6 +251,11 @@ def play(scenes: Scenes, safety_filter: str | FilterMaker | SafetyFilter, condit
         if not np.isfinite(filtered).all():
             b, i, _ = np.argwhere(~np.isfinite(filtered))[0]
             raise FleetError(f"step {step}: the command for boat {i} of game {b} is not finite: {filtered[b, i]}")
+        if missing := [name for name in ("reason", "safety_margin_m") if not hasattr(decider, name)]:
+            raise ConfigError(
+                f"the safety filter {type(decider).__name__} has no {' and no '.join(missing)} after decide(...); give "
+                "both, (games, boats), as baselines.registry.NoFilter does"
+            )
         played.reason[step], played.safety_margin_m[step] = decider.reason, decider.safety_margin_m
         move(world, filtered, step)
         played.state[step + 1] = world.state

@@ -42,6 +42,8 @@ class Entrant:
 
 
 _ENTRANTS: dict[str, Entrant] = {}
+RESERVED: set[str] = set()
+"""Names of other policies, which no entrant may have; `registry` fills it."""
 
 
 def entrant(
@@ -63,6 +65,8 @@ def entrant(
         before = _ENTRANTS.get(name)
         if not name or not name.replace("_", "").replace("-", "").isalnum():
             raise PolicyError(f"an entrant cannot be named {name!r}; use letters, digits, _ and -")
+        if name in RESERVED:
+            raise PolicyError(f"there is a policy {name!r} already; choose another name")
         if before is not None and before.build.__qualname__ != build.__qualname__:
             raise PolicyError(
                 f"there is an entrant {name!r} already ({before.build.__qualname__}); choose another name"

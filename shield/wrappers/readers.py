@@ -63,6 +63,7 @@ class GameReader(Protocol):
         """Return field edge, obstacles and (with ``keep_out``) the own flag's circle."""
 
 
+_MEMBERS = ("agent_ids", "takes_pairs_only", *(name for name in vars(GameReader) if not name.startswith("_")))
 GROUP = "steerclear.readers"
 """Entry-point group of other packages: each entry names a module that registers readers."""
 Build = TypeVar("Build", bound=Callable[[Any], GameReader])
@@ -87,13 +88,17 @@ def reader_of(env: Any) -> GameReader:
     """Return the reader for an environment. The reader registered last is tried first.
 
     Raises:
-        ConfigError: no reader fits.
+        ConfigError: no reader fits, or one lacks a member of `GameReader`.
     """
     load_others(GROUP)
     base = getattr(env, "unwrapped", env)
     for fits, build in reversed(_REGISTERED.items()):
         if fits(base):
-            return build(base)
+            reader = build(base)
+            missing = sorted(name for name in _MEMBERS if not hasattr(reader, name))
+            if missing:
+                raise ConfigError(f"the reader {type(reader).__name__} has no {', '.join(missing)}; see GameReader")
+            return reader
     raise ConfigError(
         f"cannot read a game from {type(base).__name__}; give an MctfEnv or a Pyquaticus env, or register a GameReader "
         "for yours (steerclear.shield.wrappers.game_reader), or wrap a function: Shield(...).wrap(f, read=...), where "

@@ -2,12 +2,19 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from steerclear import policies
 from steerclear.env.mctf import MctfEnv
-from steerclear.experiments.conformance import NotConforming, check_platform, check_policy, check_reader
+from steerclear.experiments.conformance import (
+    NotConforming,
+    check_barrier,
+    check_platform,
+    check_policy,
+    check_reader,
+)
 from steerclear.policies.entrants import catalogue
 from steerclear.shield import Shield, foreign
 from steerclear.shield.barriers import registry as barriers
@@ -162,6 +169,18 @@ def test_a_reader_that_does_not_conform_is_told(apart, reader, words):
     game_reader(lambda env: isinstance(env, MctfEnv))(reader)
     with pytest.raises(NotConforming, match=words):
         check_reader(lambda: MctfEnv("aamas2024"))
+
+
+def test_a_reader_without_a_part_is_told_which(apart):
+    game_reader(lambda env: isinstance(env, MctfEnv))(lambda env: SimpleNamespace(agent_ids=(), takes_pairs_only=False))
+    with pytest.raises(ConfigError, match=r"SimpleNamespace has no check_answers, commands, facts, .*; see GameReader"):
+        check_reader(lambda: MctfEnv("aamas2024"))
+
+
+@pytest.mark.parametrize("area_m", [40, (10, 10), (50, 50, -50, -50)])
+def test_an_area_of_another_form_is_refused(area_m):
+    with pytest.raises(ConfigError, match=r"give \(xmin, ymin, xmax, ymax\), m"):
+        check_barrier("none", area_m)
 
 
 def test_what_nobody_reads_is_refused():

@@ -138,6 +138,8 @@ def test_a_newcomer_is_a_policy_by_name(monkeypatch):
     assert policies.fingerprint("ohto") == ""
     with pytest.raises(PolicyError, match="there is an entrant 'ohto' already"):
         policies.entrant("ohto", "another")(Rush)
+    with pytest.raises(PolicyError, match="there is a policy 'medium' already; choose another name"):
+        policies.entrant("medium", "another")(Rush)
     with pytest.raises(PolicyError, match="cannot be named 'a/b'"):
         policies.entrant("a/b", "a path")(Rush)
     with pytest.raises(PolicyError, match="entrant 'idle' cannot play; give its class: decide"):

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from steerclear.experiments import encounters
 from steerclear.experiments.baselines.registry import NoFilter, build_filter, split_name
 from steerclear.experiments.encounters import FAMILIES, Conditions, draw, play
 from steerclear.shield.batch import BatchedShield
-from steerclear.shield.exceptions import FleetError
+from steerclear.shield.exceptions import ConfigError, FleetError
 from steerclear.shield.platforms import layout as L
 
 USUAL = Conditions()
@@ -92,7 +93,13 @@ def test_a_delayed_command_takes_effect_so_much_later():
     np.testing.assert_array_equal(paths[0][:, 1], paths[1][:, 1])  # others obey at once
 
 
-def test_a_guard_that_sends_no_number_is_refused():
+def test_a_filter_without_a_reason_is_refused():
+    bare = SimpleNamespace(decide=lambda state, nominal, ours: nominal)
+    with pytest.raises(ConfigError, match="SimpleNamespace has no reason and no safety_margin_m after decide"):
+        play(short(draw("head_on", "heron", "heron", USUAL, 1, 0, 2)), bare, USUAL)
+
+
+def test_a_filter_that_sends_no_number_is_refused():
     scenes = short(draw("head_on", "heron", "heron", USUAL, 1, 0, 2))
     with pytest.raises(FleetError, match="boat 0 of game 0 is not finite"):
         play(scenes, Recording(2, 2, turn_deg=math.nan), USUAL)
