@@ -26,8 +26,9 @@ from steerclear.shield.jit import Array, BoolArray, IntArray, copy_row, kernel
 from steerclear.shield.platforms import Platform
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.actuator import actuate, command_for_turn, thrust_after
+from steerclear.shield.platforms.rudder import turn_in_step
 from steerclear.shield.platforms.step import step_boat
-from steerclear.shield.platforms.usv import clamp, turn_of_rudder
+from steerclear.shield.platforms.usv import clamp
 from steerclear.shield.tables.files import ValueTable, load_table, stack_tables
 from steerclear.shield.tables.lookup import WHOLE_S, Tables, table_gradient, table_range_m, table_value
 from steerclear.shield.tables.settings import OtherMay
@@ -159,8 +160,8 @@ BACKUPS = np.array([(k / 4.0, 1.0) for k in range(5)] + [(0.0, 0.0)] + [(k / 4.0
 def _effects(setup: Setup, i: int, state: Array, command: Array, later: Array, z: Array) -> tuple[float, float]:
     """Write boat i's z (2,) and return the full turn of this step, deg, and d(v)/d(z_s), m/s."""
     params, top, row, root = setup.params[i], setup.params[i, L.MAX_SPEED], state.copy(), math.sqrt(setup.speed_weight)
-    rudder = min(params[L.MAX_RUDDER], 100.0)
-    full = abs(turn_of_rudder(params, thrust_after(params, state, command[0], setup.dt_s), rudder, setup.dt_s))
+    rudder, thrust = min(params[L.MAX_RUDDER], 100.0), thrust_after(params, state, command[0], setup.dt_s)
+    full = abs(turn_in_step(params, state[L.SPEED], thrust, rudder, setup.dt_s))
     full, turn = max(full, 1e-6), (later[L.HEADING] - state[L.HEADING] + 180.0) % 360.0 - 180.0
     z[0], z[1] = clamp(turn / full, -1.0, 1.0), root * clamp(command[0] / top, 0.0, 1.0)
     step = -0.1 * top if command[0] > 0.5 * top else 0.1 * top
@@ -361,13 +362,13 @@ class ReachFilter(BatchFilter):
                 f"the radius to keep is {self.radius_m:g} m with buffer and position error, and the value tables tell "
                 f"distances up to {cap_m:g} m; choose a smaller separation_m"
             )
-        rudders = [(row, row[L.MAX_THRUST], min(row[L.MAX_RUDDER], 100.0)) for row in self.params]
+        rudders = [(row, row[L.MAX_SPEED], row[L.MAX_THRUST], min(row[L.MAX_RUDDER], 100.0)) for row in self.params]
         self.setup = Setup(
             tables=stack_tables(tables),
             table=index,
             params=self.params,
             team=np.array(team, dtype=np.int64),
-            full_deg=np.array([abs(turn_of_rudder(*rudder, config.dt_s)) for rudder in rudders]),
+            full_deg=np.array([abs(turn_in_step(*rudder, config.dt_s)) for rudder in rudders]),
             radius_m=self.radius_m,
             decay=math.exp(-config.cbf_rate_per_s * config.dt_s),
             cap_m=min(config.margin_cap_m, cap_m - self.radius_m),

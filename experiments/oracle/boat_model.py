@@ -2,7 +2,8 @@
 
 ``p`` is a parameter row of `N_ROW` columns: kind (0 usv, 1 single, 2 double integrator, 3 rate), top speed, speed
 factor, max thrust, max rudder, turn loss, turn rate, max acc, max dec, rotation; speed kp, ki, kd, limit, gain; heading
-kp, ki, kd, limit; max turn rate, max angular acceleration; number of points of the thrust map, 8 thrusts, 8 speeds.
+kp, ki, kd, limit; max turn rate, max angular acceleration (of a usv: the speed from which it turns at its turn rate);
+number of points of the thrust map, 8 thrusts, 8 speeds.
 ``s`` is a state row of `N_STATE` columns.
 """
 
@@ -46,10 +47,10 @@ class Boat:
     """A boat and its autopilot. Speeds m/s, accelerations m/s2, angles deg, thrust and rudder percent.
 
     Controllers are kp, ki, kd, integral limit. Kind "usv" steers by thrust and rudder; its ``turn_rate`` is at full
-    rudder and thrust 50. Kind "rate" steers by a rate loop: ``max_rudder`` is its turn rate at rest, deg/s;
-    ``turn_rate`` the gain with speed, deg/s per m/s; the heading kp the rate commanded per deg of error, 1/s; kd of
-    both controllers are lags, s. With a speed factor of 0, a speed controller changes the thrust. A max acc or dec of 0
-    means no limit.
+    rudder and thrust 50, and, if ``max_angular_acc`` is above 0, from that speed, m/s, on (in proportion below). Kind
+    "rate" steers by a rate loop: ``max_rudder`` is its turn rate at rest, deg/s; ``turn_rate`` the gain with speed,
+    deg/s per m/s; the heading kp the rate commanded per deg of error, 1/s; kd of both controllers are lags, s. With a
+    speed factor of 0, a speed controller changes the thrust. A max acc or dec of 0 means no limit.
 
     Raises:
         OracleError: values no boat can have.
@@ -190,6 +191,8 @@ def _usv(p: Array, s: Array, speed_mps: float, error_deg: float, dt_s: float) ->
         speed = max(speed, s[3] - p[8] * dt_s)
     turn = s[5] / 100.0 * p[6] * dt_s * abs(s[4]) / 50.0
     turn = 0.0 if speed == 0.0 else math.copysign(1.0, s[4]) * turn
+    if p[20] > 0.0:
+        turn *= max(0.0, min(1.0, speed / p[20]))
     mean = 0.5 * (speed + s[3])
     _go(s, mean, turn + p[9] * dt_s, dt_s)
     s[3] = max(0.0, min(mean, p[1]))

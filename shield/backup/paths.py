@@ -191,7 +191,7 @@ def trace_path(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path
         full_thrust: shape (3,), notes on the path, see `FULL_THRUST_SAMPLE`.
     """
     full_thrust[FULL_THRUST_SAMPLE] = -1.0
-    if params[L.KIND] == L.KIND_USV and params[L.ROTATE_SPEED] == 0.0:
+    if params[L.KIND] == L.KIND_USV and params[L.ROTATE_SPEED] == 0.0 and params[L.FULL_TURN_SPEED] == 0.0:
         _trace_usv(params, row, manoeuvre, span, path, full_thrust)
         return
     rudder, togo_deg, speed_mps, dt_s = manoeuvre.rudder, manoeuvre.togo_deg, manoeuvre.speed_mps, span.dt_s
@@ -226,7 +226,7 @@ def _turn_of_step(at: AtThrust, togo_deg: float, most: float, params: Array) -> 
 
 @lean_kernel
 def _trace_usv(params: Array, row: Array, manoeuvre: Manoeuvre, span: Span, path: Array, full_thrust: Array) -> None:
-    """Do the work of `trace_path` for thrust boats: the same model in local variables, the heading as a unit vector.
+    """Do the work of `trace_path` for boats that turn by thrust and rudder alone: in local variables, a unit vector.
 
     The turn of a step combines rudder, thrust and sign. The rudder is held until less than a step's turn is left; the
     last step ends on the mark. The boat moves along the mean heading of a step, half its turn from the old one. With

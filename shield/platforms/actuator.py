@@ -23,6 +23,7 @@ from .rate import (
     turn_limit,
     wanted_for_turn,
 )
+from .rudder import hardest_rudder, rudder_for_turn, turn_in_step
 from .step import error_for_turn, moves_in, turn_at_rudder
 from .usv import actuate_usv, clamp, next_thrust, turn_of_rudder
 
@@ -38,9 +39,12 @@ def held_rudder(params: Array) -> float:
 
 @lean_kernel
 def largest_turn(params: Array, state: Array, dt_s: float) -> float:
-    """Return the largest turn, deg, that each of many steps can make with the present thrust (or turn-rate limit)."""
+    """Return the largest turn, deg, that each of many steps can make with the present thrust (or turn-rate limit).
+
+    Of a boat that needs way to turn it is the largest in this step.
+    """
     if params[L.KIND] == L.KIND_USV:
-        return abs(turn_of_rudder(params, state[L.THRUST], held_rudder(params), dt_s))
+        return abs(_hardest_turn(params, state[L.SPEED], state[L.THRUST], dt_s))
     if params[L.KIND] == L.KIND_SINGLE_INTEGRATOR:
         return params[L.MAX_TURN_RATE] * dt_s
     if params[L.KIND] == L.KIND_RATE:
@@ -49,6 +53,13 @@ def largest_turn(params: Array, state: Array, dt_s: float) -> float:
         return rate_after(params, state[L.SPEED], rate, wanted, dt_s) * dt_s
     reach = abs(state[L.TURN_RATE]) + params[L.MAX_ANGULAR_ACC] * dt_s
     return min(reach, params[L.MAX_TURN_RATE]) * dt_s
+
+
+@lean_kernel
+def _hardest_turn(params: Array, speed_mps: float, thrust: float, dt_s: float) -> float:
+    """Return the largest turn, deg, of a step begun at a speed, m/s, with a rudder that can be held."""
+    rudder = hardest_rudder(params, speed_mps, thrust, held_rudder(params), dt_s)
+    return turn_in_step(params, speed_mps, thrust, rudder, dt_s)
 
 
 @lean_kernel
@@ -62,13 +73,15 @@ def thrust_after(params: Array, state: Array, speed_mps: float, dt_s: float) -> 
 
 @lean_kernel
 def full_turn(params: Array, state: Array, speed_mps: float, dt_s: float) -> float:
-    """Return the largest turn, deg, that this step and any later one can make under a speed command."""
+    """Return the largest turn, deg, that this step and any later one can make under a speed command.
+
+    Of a boat that needs way to turn it is that of this step; if of several moves, that at full rudder.
+    """
     moves = moves_in(params, dt_s)
     if moves > 1 and params[L.KIND] == L.KIND_USV:
         return turn_at_rudder(params, state, speed_mps, held_rudder(params), dt_s / moves, moves)
     if params[L.KIND] == L.KIND_USV:
-        thrust = thrust_after(params, state, speed_mps, dt_s)
-        return turn_of_rudder(params, thrust, held_rudder(params), dt_s)
+        return _hardest_turn(params, state[L.SPEED], thrust_after(params, state, speed_mps, dt_s), dt_s)
     if params[L.KIND] == L.KIND_RATE:
         return turn_limit(params, state[L.SPEED]) * dt_s
     return params[L.MAX_TURN_RATE] * dt_s
@@ -79,10 +92,8 @@ def actuate(params: Array, state: Array, speed_mps: float, turn_deg: float, dt_s
     """Advance ``state`` by one step, turning by ``turn_deg`` as nearly as a rudder that can be held allows."""
     kind = params[L.KIND]
     if kind == L.KIND_USV:
-        full = turn_of_rudder(params, thrust_after(params, state, speed_mps, dt_s), 100.0, dt_s)
-        rudder = 0.0
-        if full > 0.0:
-            rudder = clamp(100.0 * turn_deg / full, -held_rudder(params), held_rudder(params))
+        thrust = thrust_after(params, state, speed_mps, dt_s)
+        rudder = rudder_for_turn(params, state[L.SPEED], thrust, turn_deg, held_rudder(params), dt_s)
         actuate_usv(params, state, speed_mps, rudder, dt_s)
     elif kind == L.KIND_SINGLE_INTEGRATOR:
         step_single_integrator(params, state, speed_mps, turn_deg, dt_s)
@@ -112,11 +123,10 @@ def command_for_turn(params: Array, state: Array, speed_mps: float, turn_deg: fl
         return clamp(turn_deg / moves, -FARTHEST_DEG, FARTHEST_DEG)
     if moves > 1:
         return error_for_turn(params, state, speed_mps, turn_deg, FARTHEST_DEG, dt_s / moves, moves)
-    full = turn_of_rudder(params, thrust_after(params, state, speed_mps, dt_s), 100.0, dt_s)
-    if not full > 0.0:
+    thrust, limit = thrust_after(params, state, speed_mps, dt_s), min(params[L.MAX_RUDDER], 100.0)
+    if not turn_of_rudder(params, thrust, 100.0, dt_s) > 0.0:
         return 0.0
-    limit = min(params[L.MAX_RUDDER], 100.0)
-    rudder = clamp(100.0 * turn_deg / full, -limit, limit)
+    rudder = rudder_for_turn(params, state[L.SPEED], thrust, turn_deg, limit, dt_s)
     return _error_for_rudder(params, state, rudder, dt_s)
 
 

@@ -68,12 +68,14 @@ KIND_SINGLE_INTEGRATOR = 1
 KIND_DOUBLE_INTEGRATOR = 2
 KIND_RATE = 3
 
-# --- columns that boats of `KIND_RATE` use for other values ------------------------------------------
+# --- columns that boats of one kind use for other values ---------------------------------------------
+FULL_TURN_SPEED = MAX_ANGULAR_ACC
+"""`KIND_USV`: speed from which the boat turns at its full rate, m/s; 0: at any speed."""
 TURN_AT_REST = MAX_RUDDER
-"""Turn rate at rest, deg/s."""
+"""`KIND_RATE`: turn rate at rest, deg/s."""
 TURN_PER_SPEED = TURN_GAIN
-"""Turn rate gained with speed, deg/s per m/s; negative: lost."""
+"""`KIND_RATE`: turn rate gained with speed, deg/s per m/s; negative: lost."""
 SPEED_LAG = SPEED_KD
-"""Lag of the speed, s."""
+"""`KIND_RATE`: lag of the speed, s."""
 TURN_LAG = HEADING_KD
-"""Lag of the turn rate, s."""
+"""`KIND_RATE`: lag of the turn rate, s."""

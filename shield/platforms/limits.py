@@ -13,7 +13,7 @@ from ..jit import Array
 from . import layout as L
 from .actuator import actuate, largest_turn
 from .platform import Platform
-from .usv import fresh_state
+from .usv import fresh_state, turn_of_rudder
 
 LONGEST_S = 60.0
 
@@ -111,10 +111,14 @@ def cruise(platform: Platform, dt_s: float = 0.1) -> tuple[Array, Array]:
 def _turn_rate(platform: Platform, dt_s: float) -> float:
     """Return the highest turn rate, deg/s.
 
-    In a turn the speed controller adds thrust for the lost speed, which also makes the boat turn faster.
+    In a turn the speed controller adds thrust for the lost speed, which also makes the boat turn faster. A boat that
+    needs way to turn is granted the most thrust and the highest speed at once: it may have both after a zig-zag.
     """
     if platform.kind == "rate":
         return max(platform.max_turn_rate_at(0.0), platform.max_turn_rate_at(platform.max_speed_mps))
+    if platform.full_turn_speed_mps > 0.0:
+        full = float(turn_of_rudder(platform.pack(), platform.max_thrust, min(platform.max_rudder, 100.0), 1.0))
+        return full * platform.way_share(platform.newest_mps(dt_s))
     return round(max(_turns(platform, dt_s, True)) / dt_s, 9)
 
 

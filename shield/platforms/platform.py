@@ -62,6 +62,9 @@ ENTRIES: dict[str, Entry] = {
     "max_thrust": Entry("percent", "largest thrust", USV, L.MAX_THRUST),
     "max_rudder": Entry("percent", "largest rudder", USV, L.MAX_RUDDER),
     "turn_gain": Entry("deg/s", "turn rate at full rudder and thrust 50; twice that at thrust 100", USV, L.TURN_GAIN),
+    "full_turn_speed_mps": Entry(
+        "m/s", "speed for that turn rate, in proportion below; 0: at any speed", USV, L.FULL_TURN_SPEED
+    ),
     "rotate_speed_dps": Entry("deg/s", "turn rate that is always there", USV, L.ROTATE_SPEED),
     "speed_gain": Entry("percent per output", "of speed_pid, added to the thrust in each step", USV, L.SPEED_GAIN),
     "speed_pid": Entry("", "speed controller: output per m/s", USV, L.SPEED_KP),
@@ -104,8 +107,9 @@ class Platform:
     Units: speeds m/s, accelerations m/s^2, turn rates deg/s, thrust and rudder in percent. `ENTRIES` explains each
     setting.
 
-    For ``kind="usv"`` the heading change per step is ``rudder * turn_gain/100 * dt * thrust/50`` deg. The steady speed
-    is ``thrust_map(thrust) * (1 - |rudder|/100 * turn_loss)``. A limit of 0 on acceleration or deceleration means none.
+    For ``kind="usv"`` the heading change per step is ``rudder * turn_gain/100 * dt * thrust/50`` deg. Below
+    ``full_turn_speed_mps`` it shrinks in proportion to speed. The steady speed is ``thrust_map(thrust) * (1 -
+    |rudder|/100 * turn_loss)``. A limit of 0 on acceleration or deceleration means none.
 
     Integrators use ``max_turn_rate_dps``, ``max_acc`` and ``max_angular_acc_dps2``. ``kind="rate"`` turns by a rate
     loop, see `rate`. It also uses ``max_dec`` (0: as ``max_acc``), ``turn_rate_at_rest_dps``, ``turn_rate_per_mps``,
@@ -127,6 +131,7 @@ class Platform:
     max_rudder: float = 100.0
     turn_loss: float = 0.0
     turn_gain: float = 0.0
+    full_turn_speed_mps: float = 0.0
     max_acc: float = 0.0
     max_dec: float = 0.0
     rotate_speed_dps: float = 0.0
@@ -188,19 +193,23 @@ class Platform:
                     raise PlatformError(f"{who}: {name} is 0; a boat of kind 'rate' needs one above 0")
             if self.heading_pid.kp == 0:
                 raise PlatformError(f"{who}: heading_pid.kp is 0; give deg/s commanded per deg of heading error")
-            return
         for name, entry in ENTRIES.items():
-            if entry.kinds == RATE and getattr(self, name) != 0:
-                raise PlatformError(f"{who}: {name} is for boats of kind 'rate', this is a {self.kind!r}; leave it out")
+            alone = entry.kinds == RATE or name == "full_turn_speed_mps"
+            if alone and self.kind not in entry.kinds and getattr(self, name) != 0:
+                kind = entry.kinds[0]
+                raise PlatformError(
+                    f"{who}: {name} is for boats of kind {kind!r}, this is a {self.kind!r}; leave it out"
+                )
 
     def pack(self) -> NDArray[np.float64]:
         """Return the parameter row for compiled code, shape ``(N_PARAM,)``, laid out as in `layout`."""
         row = np.zeros(L.N_PARAM)
         row[L.KIND] = KINDS[self.kind]
-        shared = [name for name, entry in ENTRIES.items() if entry.kinds != RATE and name != "thrust_map"]
-        own = [name for name, entry in ENTRIES.items() if entry.kinds == RATE] if self.kind == "rate" else []
-        for name in (*shared, *own):  # boats of kind rate use some columns of others for their own values
-            value, column = getattr(self, name), ENTRIES[name].column
+        entries = [(name, entry) for name, entry in ENTRIES.items() if name != "thrust_map"]
+        # kinds use some columns for values of their own: what is for this kind alone is written last
+        entries.sort(key=lambda item: (self.kind in item[1].kinds, -len(item[1].kinds)))
+        for name, entry in entries:
+            value, column = getattr(self, name), entry.column
             values = astuple(value) if isinstance(value, Gains) else (value,)
             row[column : column + len(values)] = values
         if self.kind == "rate":
@@ -216,6 +225,10 @@ class Platform:
 
         A thrust boat moves with the mean of old and new speed; only the stored speed is limited to top speed.
         """
+        return max(self.max_speed_mps, 0.5 * (self.max_speed_mps + self.newest_mps(dt_s)))
+
+    def newest_mps(self, dt_s: float) -> float:
+        """Return the highest speed at the end of a step of ``dt_s``, before the mean with the old one, m/s."""
         if self.kind != "usv":
             return self.max_speed_mps
         thrusts, speeds = np.asarray(self.thrust_map).T
@@ -223,7 +236,7 @@ class Platform:
         new = float(np.interp(reached, thrusts, speeds).max())
         if self.max_acc > 0.0:
             new = min(new, self.max_speed_mps + self.max_acc * dt_s)
-        return max(self.max_speed_mps, 0.5 * (self.max_speed_mps + new))
+        return new
 
     def max_turn_rate_at(self, speed_mps: float) -> float:
         """Return the highest steady turn rate, deg/s, at a straight-line speed, m/s.
@@ -238,4 +251,9 @@ class Platform:
         thrusts, speeds = np.asarray(self.thrust_map).T
         thrust = min(float(np.interp(speed_mps, speeds, thrusts)), self.max_thrust)
         rudder = min(self.max_rudder, 100.0)
-        return rudder * self.turn_gain / 100.0 * thrust / 50.0
+        return rudder * self.turn_gain / 100.0 * thrust / 50.0 * self.way_share(speed_mps)
+
+    def way_share(self, speed_mps: float) -> float:
+        """Return the share of its full turn that a thrust boat makes at a speed, m/s."""
+        full_mps = self.full_turn_speed_mps
+        return min(speed_mps / full_mps, 1.0) if full_mps > 0.0 else 1.0

@@ -127,6 +127,8 @@ def _at_fault(manoeuvre: str, params: Array, state: Array, fault_in: Callable[[A
     trials = [(name, column, max(_AMPLE, float(params[column]))) for name, column in _LIMITS[manoeuvre].items()]
     if kind == L.KIND_RATE:
         trials.append((*_LAGS[manoeuvre], 0.0))
+    if kind == L.KIND_USV and manoeuvre == "turn":
+        trials = [("full_turn_speed_mps", L.FULL_TURN_SPEED, 0.0)]
     for name, column, value in trials:
         mended = params.copy()
         mended[column] = value

@@ -10,7 +10,8 @@ from __future__ import annotations
 from ..jit import Array, lean_kernel
 from . import layout as L
 from .rate import step_double_integrator, step_rate, step_single_integrator
-from .usv import clamp, controller, next_speed, next_thrust, step_usv, turn_of_rudder
+from .rudder import turn_in_step
+from .usv import clamp, controller, next_speed, next_thrust, step_usv
 
 HALVINGS = 44
 """Halvings that reduce the range of heading errors, 358 deg, to 1e-11 deg."""
@@ -38,7 +39,7 @@ def turn_at_rudder(params: Array, state: Array, speed_mps: float, rudder: float,
     for _ in range(moves):
         thrust, error, integral = next_thrust(params, speed, thrust, error, integral, speed_mps, move_s)
         made = rudder if thrust > 0.0 else 0.0
-        turn += turn_of_rudder(params, thrust, made, move_s)
+        turn += turn_in_step(params, speed, thrust, made, move_s)
         speed = _next_speed(params, speed, thrust, made, move_s)
     return turn
 
@@ -61,7 +62,7 @@ def turn_of_error(params: Array, state: Array, speed_mps: float, error_deg: floa
         if thrust > 0.0:
             output, memory = controller(kp, ki, kd, most, error_deg, last, memory, move_s)
             rudder, last = clamp(output, -limit, limit), error_deg
-        turn += turn_of_rudder(params, thrust, rudder, move_s)
+        turn += turn_in_step(params, speed, thrust, rudder, move_s)
         speed = _next_speed(params, speed, thrust, rudder, move_s)
     return turn
 
@@ -72,7 +73,8 @@ def error_for_turn(
 ) -> float:
     """Return the heading error, deg, to hold for a turn of ``turn_deg`` in ``moves`` substeps, or the nearest turn.
 
-    The turn grows with the error, so bisection finds it.
+    The turn grows with the error, so bisection finds it. Of a boat that needs way to turn it may not, at large errors:
+    it then finds a turn between those at both ends, not always the nearest beyond.
     """
     low, high = -farthest_deg, farthest_deg
     for _ in range(HALVINGS):

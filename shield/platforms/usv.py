@@ -3,6 +3,14 @@
 The model is that of MOOS-IvP's uSimMarine (thrust map, turn loss, turn rate) behind pMarinePID, as used by the
 competition's simulator. ``step_usv`` is the whole boat as a policy commands it. ``actuate_usv`` is the hull with the
 speed controller, for predictions that choose rudder and speed command directly.
+
+The heading change of a step is
+
+    rudder/100 * turn_gain * dt * thrust/50 * min(1, speed/full_turn_speed),
+
+with the speed at the end of the step, before its mean with the old one is stored. uSimMarine and Pyquaticus have not
+the last factor (full_turn_speed = 0). uSimMarineV22 and V23 have it, with 5 m/s in any mission: this is written from
+SimEngine::propagateHeading and TurnSpeedMap of MOOS-IvP a2a9b71, where ``turn_rate`` is our ``turn_gain``.
 """
 
 from __future__ import annotations
@@ -131,11 +139,18 @@ def update_rudder(params: Array, state: Array, heading_error_deg: float, dt_s: f
 
 @lean_kernel
 def turn_of_rudder(params: Array, thrust: float, rudder: float, dt_s: float) -> float:
-    """Return the heading change, deg, of one step of a moving boat: proportional to rudder and to thrust."""
+    """Return the heading change, deg, of one step of a boat with full way: proportional to rudder and to thrust."""
     turn = rudder * (params[L.TURN_GAIN] / 100.0) * dt_s * (1.0 + (abs(thrust) - 50.0) / 50.0)
     if thrust < 0.0:
         turn = -turn
     return turn
+
+
+@lean_kernel
+def way_share(params: Array, speed_mps: float) -> float:
+    """Return the share of its full turn that a boat makes in a step that ends with a speed, m/s."""
+    full_mps = params[L.FULL_TURN_SPEED]
+    return clamp(speed_mps / full_mps, 0.0, 1.0) if full_mps > 0.0 else 1.0
 
 
 @lean_kernel
@@ -170,7 +185,7 @@ def advance_hull(params: Array, state: Array, dt_s: float) -> None:
     speed = next_speed(params, state[L.SPEED], thrust, rudder, dt_s)
     turn = params[L.ROTATE_SPEED] * dt_s
     if speed != 0.0:
-        turn += turn_of_rudder(params, thrust, rudder, dt_s)
+        turn += turn_of_rudder(params, thrust, rudder, dt_s) * way_share(params, speed)
     move_along_mean(params, state, speed, state[L.HEADING] + turn, dt_s)
 
 

@@ -9,8 +9,9 @@ import numpy as np
 from ..jit import Array, kernel
 from ..platforms import layout as L
 from ..platforms.actuator import command_for_turn
+from ..platforms.rudder import turn_in_step
 from ..platforms.step import step_boat
-from ..platforms.usv import turn_of_rudder, wrap_degrees
+from ..platforms.usv import wrap_degrees
 from .lookup import WHOLE_S, Tables, table_value
 from .moves import SUB_STEP_S, run_hull
 from .sweep import closest
@@ -78,10 +79,17 @@ def best_rudders(
 
 
 @kernel
+def turn_at_full_thrust(params: Array, state: Array, rudder: float) -> float:
+    """Return the turn, deg, of one step of the full model at full thrust with a rudder (share of full, 0 to 1)."""
+    full = rudder * min(params[L.MAX_RUDDER], 100.0)
+    return abs(turn_in_step(params, state[L.SPEED], params[L.MAX_THRUST], full, SUB_STEP_S))
+
+
+@kernel
 def steer(params: Array, state: Array, rudder: float) -> None:
     """Advance the full model by one step through its autopilot, at top speed and with a rudder (share of full)."""
     top = params[L.MAX_SPEED]
-    turn = rudder * abs(turn_of_rudder(params, params[L.MAX_THRUST], min(params[L.MAX_RUDDER], 100.0), SUB_STEP_S))
+    turn = math.copysign(turn_at_full_thrust(params, state, abs(rudder)), rudder)
     step_boat(params, state, top, command_for_turn(params, state, top, turn, SUB_STEP_S), SUB_STEP_S)
 
 
@@ -95,8 +103,7 @@ def chase(params: Array, pursuer: Array, prey: Array, lead: bool) -> float:
         dx += math.sin(heading) * prey[L.SPEED] * time
         dy += math.cos(heading) * prey[L.SPEED] * time
     error = wrap_degrees(math.degrees(math.atan2(dx, dy)) - pursuer[L.HEADING])
-    full = abs(turn_of_rudder(params, params[L.MAX_THRUST], min(params[L.MAX_RUDDER], 100.0), SUB_STEP_S))
-    return min(max(error / full, -1.0), 1.0)
+    return min(max(error / turn_at_full_thrust(params, pursuer, 1.0), -1.0), 1.0)
 
 
 @kernel

@@ -24,7 +24,10 @@ from .vehicle import MoosLink, client_name
 APART_M = 5.0  # NAV_X, NAV_Y and NAV_LAT, NAV_LONG agree within this
 SHORTEST_S, LONGEST_S = 1.0, 2.0
 """Bounds of a PID's tardy thresholds: it must outlast two missed commands, and stop a boat whose gate died."""
-PIDS, SIMULATORS = ("pMarinePID", "pMarinePIDV22"), ("uSimMarine", "uSimMarineV22", "uSimMarineV23")
+PIDS = ("pMarinePID", "pMarinePIDV22")
+SIMULATORS = {"uSimMarine": 0.0, "uSimMarineV22": 5.0, "uSimMarineV23": 5.0}
+"""The speed from which each turns a boat by its turn_rate, in proportion below, m/s; 0: at any speed."""
+TURN_RATE, MOST_TURN_RATE = 70.0, 100.0  # of a simulator whose mission gives none, and the most that it takes
 LEAST_TICK = {**dict.fromkeys((*PIDS, *SIMULATORS), 5.0), "pHelmIvP": 2.0, "pNodeReporter": 2.0}
 GAIN_OFF = 0.2  # share by which a PID's gains may differ from the platform's
 _BLOCK = re.compile(r"ProcessConfig\s*=\s*(\w+)\s*\{([^}]*)\}", re.IGNORECASE)
@@ -214,6 +217,9 @@ def mission_faults(
         yield f"{len(pids)} PIDs are configured: have one of {' and '.join(PIDS)}"
     for name in pids:
         yield from _pid_faults(mission, name, platform)
+    for name in SIMULATORS:
+        if name in mission:
+            yield from _hull_faults(mission, name, platform)
     for name, least in LEAST_TICK.items():
         if not number(mission, name, "apptick", least) >= least:
             yield f"{name} has AppTick {mission[name]['apptick']}: set it to {least:g} or more"
@@ -227,6 +233,23 @@ def _pid_faults(mission: Mission, name: str, platform: Platform) -> Iterator[str
         value = number(mission, name, key, needed)
         if abs(value - needed) > GAIN_OFF * max(abs(needed), 1e-6):
             yield f"{name} has {key} {value:g} and platform {platform.name} {needed:g}: fit the platform, or set it"
+
+
+def _hull_faults(mission: Mission, name: str, platform: Platform) -> Iterator[str]:
+    """What the simulator does with a rudder and the platform does not, at top speed or at half of it."""
+    if platform.kind != "usv":
+        return
+    rate, full_mps = min(number(mission, name, "turn_rate", TURN_RATE), MOST_TURN_RATE), SIMULATORS[name]
+    for speed_mps in (platform.max_speed_mps, 0.5 * platform.max_speed_mps):
+        theirs = rate * min(1.0, speed_mps / full_mps) if full_mps > 0.0 else rate
+        ours = platform.turn_gain * platform.way_share(speed_mps)
+        if not abs(ours - theirs) <= GAIN_OFF * theirs:
+            yield (
+                f"{name} turns this boat by {theirs:.3g} deg/s at {speed_mps:g} m/s and thrust 50, platform "
+                f"{platform.name} by {ours:.3g}: give the platform turn_gain: {rate:g} and full_turn_speed_mps: "
+                f"{full_mps:g}, or fit it"
+            )
+            return
 
 
 def _gains(platform: Platform) -> dict[str, float]:

@@ -58,6 +58,7 @@ BOATS = {
         "heading_pid": (0.35, 0.0, 0.07, 0.07),
     },
 }
+BOATS["heron_v22"] = {**BOATS["heron"], "full_turn_speed": 5.0}
 
 
 class Pid:
@@ -79,8 +80,8 @@ class Pid:
 class ThrustBoat:
     """A boat with thrust, rudder and two controllers."""
 
-    def __init__(self, name, x, y, heading, speed):
-        self.boat = BOATS[name]
+    def __init__(self, boat, x, y, heading, speed):
+        self.boat = boat
         self.x, self.y, self.heading, self.speed, self.thrust = x, y, heading, speed, 0.0
         self.speed_pid = Pid(self.boat["speed_pid"], self.boat["max_thrust"])
         self.heading_pid = Pid(self.boat["heading_pid"], 100.0)
@@ -106,6 +107,8 @@ class ThrustBoat:
         if boat["max_dec"] > 0:
             new = max(new, self.speed - boat["max_dec"] * dt)
         turn = rudder * boat["turn_rate"] / 100 * dt * (1 + (abs(self.thrust) - 50) / 50) if new != 0 else 0.0
+        if boat.get("full_turn_speed"):
+            turn *= float(np.clip(new / boat["full_turn_speed"], 0.0, 1.0))
         _move(self, new, self.heading + turn, dt)
         self.speed = float(np.clip((new + self.speed) / 2, 0.0, boat["top"]))
 
@@ -171,4 +174,6 @@ def oracle(name, x, y, heading, speed):
     """A boat of either sort."""
     if name in RATE_BOATS:
         return RateBoat(name, x, y, heading, speed)
-    return (Integrator if name in ("si", "di") else ThrustBoat)(name, x, y, heading, speed)
+    if name in ("si", "di"):
+        return Integrator(name, x, y, heading, speed)
+    return ThrustBoat(BOATS[name], x, y, heading, speed)

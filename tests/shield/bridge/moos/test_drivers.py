@@ -1,6 +1,7 @@
 """Who drives: hands, all-stops, other writers of what the gate writes; and what a mission file gives away."""
 
 import math
+from dataclasses import replace
 
 import pytest
 from steerclear.shield.bridge.frame import FieldFrame
@@ -156,12 +157,37 @@ ProcessConfig = pMarinePIDV22
 """
 
 
-def faults(text, port=9001, warp=1.0, gate="helm"):
-    return list(mission_faults(parse_mission(text), port, warp, get_platform("heron"), gate, "RAW_"))
+def faults(text, port=9001, warp=1.0, gate="helm", platform="heron"):
+    return list(mission_faults(parse_mission(text), port, warp, get_platform(platform), gate, "RAW_"))
 
 
 def test_a_mission_that_fits_has_no_faults():
     assert faults(MISSION) == []
+
+
+@pytest.mark.parametrize(
+    ("simulator", "turn_rate", "platform", "words"),
+    [
+        ("uSimMarine", 60, "heron", ""),
+        ("uSimMarine", 60, "heron_v22", "turns this boat by 60 deg/s at 2 m/s and thrust 50, platform heron_v22 by 24"),
+        ("uSimMarineV22", 60, "heron_v22", ""),
+        ("uSimMarineV23", 60, "heron_v22", ""),
+        ("uSimMarineV22", 60, "heron", "give the platform turn_gain: 60 and full_turn_speed_mps: 5"),
+        ("uSimMarineV22", 90, "heron_v22", "give the platform turn_gain: 90"),
+        (
+            "uSimMarineV22",
+            60,
+            replace(get_platform("heron"), turn_gain=24.0),
+            "full_turn_speed_mps: 5",
+        ),
+        ("uSimMarineV22", 60, "otter", ""),  # fitted, and checked by a drill
+    ],
+)
+def test_a_simulator_that_turns_otherwise_than_the_platform_is_named(simulator, turn_rate, platform, words):
+    block = f"ProcessConfig = {simulator}\n{{\n  AppTick = 10\n  turn_rate = {turn_rate}\n}}\n"
+    found = faults(MISSION + block, platform=platform)
+    assert len(found) == bool(words)
+    assert all(words in fault for fault in found)
 
 
 @pytest.mark.parametrize(
