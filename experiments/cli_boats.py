@@ -19,7 +19,7 @@ from rich.text import Text
 from steerclear import policies
 from steerclear.shield.bridge.blackbox import log_path
 from steerclear.shield.bridge.clock import Clock, MonotonicClock
-from steerclear.shield.bridge.feed import GameState
+from steerclear.shield.bridge.feed_packets import GameState
 from steerclear.shield.bridge.fleet_file import FleetFile, load_fleet
 from steerclear.shield.bridge.messages import TickSink
 from steerclear.shield.bridge.moos.links import POLICY as MOOS_POLICY

@@ -1,6 +1,7 @@
 """Ticks of a simulated encounter, as the loop would make them, for tests of the black box and of replays."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from steerclear.shield import Commands, Fleet, Shield, ShieldConfig, Surroundings
@@ -147,6 +148,11 @@ class Encounter:
         self.aims[near] = np.array(STARTS)[near, :2]
         course = np.arctan2(gap[:, 0], gap[:, 1]) % (2 * math.pi)
         return Commands.absolute_rad(np.stack([np.full(4, 2.0), course], axis=1))
+
+
+def numbered(ticks, number):
+    """One of the ticks, in turn, as that turn of the loop."""
+    return replace(ticks[number % len(ticks)], number=number, began_s=START_S + 0.1 * number)
 
 
 def write_log(path, steps=300, header=None, kind=Encounter, box=None, **more):

@@ -15,12 +15,19 @@ def is_running(pid):
     return state not in ("Z", "X")
 
 
-def wait_for(condition, patience_s=30.0):
-    """Wait until something holds; fail when it does not in time."""
+def until(condition, patience_s=10.0):
+    """Wait until something holds; whether it does in time."""
     end_s = time.monotonic() + patience_s
     while not condition():
-        assert time.monotonic() < end_s
+        if time.monotonic() > end_s:
+            return False
         time.sleep(0.005)
+    return True
+
+
+def wait_for(condition, patience_s=30.0):
+    """Wait until something holds; fail when it does not in time."""
+    assert until(condition, patience_s)
 
 
 @contextlib.contextmanager

@@ -25,7 +25,7 @@ from steerclear.env.mctf import MctfEnv
 from steerclear.env.motion import is_on_side
 from steerclear.policies.actions import HOLD, ActionReader
 from steerclear.policies.own import own_code
-from steerclear.shield.bridge.feed import GameState, game_state
+from steerclear.shield.bridge.feed_packets import GameState, game_state
 from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.messages import Snapshot
 from steerclear.shield.exceptions import FleetError, FleetFileError, PolicyError, SteerclearError

@@ -13,7 +13,8 @@ from steerclear.env.arrays import CAPTURE
 from steerclear.env.config import GameConfig
 from steerclear.env.core import BatchedMctf
 from steerclear.shield.bridge.clock import Clock
-from steerclear.shield.bridge.feed import BoatStatus, FeedReceiver, FeedSender, FlagStatus, GameState
+from steerclear.shield.bridge.feed import FeedReceiver
+from steerclear.shield.bridge.feed_packets import BoatStatus, FeedSender, FlagStatus, GameState
 from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.messages import Closing, Contact
 from steerclear.shield.bridge.session import key_of

@@ -20,7 +20,7 @@ from steerclear.shield.bridge.blackbox import McapWriter, check_disk, header_of_
 from steerclear.shield.bridge.clock import Clock, MonotonicClock
 from steerclear.shield.bridge.control_loop import ControlLoop, Timing
 from steerclear.shield.bridge.drill import Drill, Missed, drill_checks
-from steerclear.shield.bridge.feed import FeedSender, PositionPublisher
+from steerclear.shield.bridge.feed_packets import FeedSender, PositionPublisher
 from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.link_checks import check_fence, link_checks
 from steerclear.shield.bridge.mavlink.vehicle import MavlinkLink

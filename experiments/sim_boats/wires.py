@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterator
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
-from steerclear.shield.bridge.feed import socket_address
+from steerclear.shield.bridge.feed_packets import socket_address
 from steerclear.shield.bridge.fleet_checks import MOOS
 from steerclear.shield.bridge.mavlink.framing import Framer
 from steerclear.shield.bridge.mavlink.transport import Address, Peer, make_wire, parse_address

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from steerclear.env.record import DEFAULT_SEPARATION_M, GameRecorder, Record, find_violations, meta_of
 from steerclear.experiments.verdicts import StateLog, judge_game
-from steerclear.shield.bridge.feed import FeedSender
-from steerclear.shield.bridge.feed_packets import Fix
+from steerclear.shield.bridge.feed_packets import FeedSender, Fix
 from steerclear.shield.bridge.frame import FieldFrame
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array

@@ -23,16 +23,11 @@ from .clock import Clock
 from .feed_packets import (
     MAX_BYTES,
     SEAL_BYTES,
-    BoatStatus,
-    FeedSender,
     Fix,
-    FlagStatus,
     GameState,
     Packet,
-    PositionPublisher,
     Seal,
     family_of,
-    game_state,
     is_sealed,
     parse_packet,
     socket_address,
@@ -40,20 +35,6 @@ from .feed_packets import (
 from .frame import FieldFrame
 from .mavlink.signing import NEW_STREAM_S, TICKS_PER_S, SigningClock
 from .messages import TELEMETRY, Alarm, Closing, Contact
-
-__all__ = [
-    "BoatStatus",
-    "FeedReceiver",
-    "FeedSender",
-    "Fix",
-    "FlagStatus",
-    "GameState",
-    "Packet",
-    "PositionPublisher",
-    "game_state",
-    "parse_packet",
-    "socket_address",
-]
 
 LOG = logging.getLogger(__name__)
 

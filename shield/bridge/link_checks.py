@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from .clock import Clock
 from .fleet_file import FleetFile
 from .mavlink.fence import FenceZone
 from .mavlink.telemetry import ENOUGH_FIX
-from .mavlink.vehicle import LinkHealth
+from .mavlink.vehicle import LinkHealth, MavlinkLink
 from .messages import BoatReading, Link
 from .preflight_checks import Check, CheckResult, Found, checks_by_kind, found
 
@@ -235,14 +235,7 @@ KINDS: Mapping[str, Callable[[Watched], Found]] = {
 """The checks, by name."""
 
 
-class Fenced(Protocol):
-    """A link to a boat that may have a fence of its own."""
-
-    def health(self) -> LinkHealth:
-        """What the link knows of the boat, once it was asked for parameters and fence."""
-
-
-def check_fence(boat: str, fleet: FleetFile, link: Fenced) -> CheckResult:
+def check_fence(boat: str, fleet: FleetFile, link: MavlinkLink) -> CheckResult:
     """The autopilot's own fence is off, or so far out that no boat of ours gets there before it is stopped."""
     health = link.health()
     known, zones, home_deg = health.parameters, health.fence, health.home_deg

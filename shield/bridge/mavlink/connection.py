@@ -204,11 +204,6 @@ class Endpoint:
             self._record("out", frame)
         return sent
 
-    def place(self, system_id: int) -> str:
-        """Where that boat is heard from, for messages."""
-        peer = self._place(system_id)
-        return str(self.address) if peer is None else f"{peer[0]}:{peer[1]}"
-
     def close(self) -> None:
         """End the thread and give the wire back; may be called again."""
         self._ending.set()

@@ -26,7 +26,7 @@ from steerclear.experiments.deploy.run import deploy, preflight
 from steerclear.experiments.sim_boats import AutopilotSettings, SimFleet
 from steerclear.shield.bridge.blackbox import LogReader, log_path
 from steerclear.shield.bridge.control_loop import Timing
-from steerclear.shield.bridge.feed import FeedSender
+from steerclear.shield.bridge.feed_packets import FeedSender
 from steerclear.shield.bridge.fleet_file import load_fleet
 from steerclear.shield.bridge.preflight_checks import CheckResult
 from steerclear.shield.bridge.session import VehicleSession

@@ -18,7 +18,8 @@ from steerclear.experiments.deploy.demo import free_ports
 from steerclear.experiments.deploy.referee import Referee, Umpire, game_config, game_obstacles, player_names, state_of
 from steerclear.experiments.sim_boats import AutopilotSettings, SimFleet
 from steerclear.shield.bridge.clock import ManualClock, MonotonicClock
-from steerclear.shield.bridge.feed import FeedReceiver, FeedSender, Fix, GameState
+from steerclear.shield.bridge.feed import FeedReceiver
+from steerclear.shield.bridge.feed_packets import FeedSender, Fix, GameState
 from steerclear.shield.bridge.fleet_file import load_fleet, parse_fleet
 from steerclear.shield.bridge.messages import Contact
 from steerclear.shield.exceptions import BridgeError, FleetFileError, GameError

@@ -8,17 +8,18 @@ import logging
 import math
 import sys
 import time
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 import pytest
 from boat_page import follow
+from bridge_fakes import Unheeded
 from steerclear.experiments.deploy.demo import free_ports
 from steerclear.experiments.deploy.orders import with_delay
 from steerclear.experiments.sim_boats import AutopilotSettings, SimFleet
 from steerclear.experiments.sim_boats.demo import off_platform
-from steerclear.shield import Commands, Shield
+from steerclear.shield import Commands
 from steerclear.shield.bridge.clock import ManualClock
 from steerclear.shield.bridge.control_loop import ControlLoop, Parts
 from steerclear.shield.bridge.fleet_file import load_fleet
@@ -71,13 +72,6 @@ class Cruise:
 
     def close(self):
         pass
-
-
-class Unheeded(Shield):
-    """A shield whose decisions nobody heeds: what is wanted is sent."""
-
-    def decide(self, fleet, wanted, surroundings=None):
-        return replace(super().decide(fleet, wanted, surroundings), filtered=wanted)
 
 
 @dataclass

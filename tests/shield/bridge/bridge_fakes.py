@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
-from steerclear.shield import Commands
+from steerclear.shield import Commands, Shield
 from steerclear.shield.bridge.clock import ManualClock
 from steerclear.shield.bridge.control_loop import ControlLoop, Parts
-from steerclear.shield.bridge.feed import FlagStatus, GameState
+from steerclear.shield.bridge.feed_packets import FlagStatus, GameState
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.bridge.messages import Answer, BoatReading, Contact, Sent
 from steerclear.shield.bridge.operator import Operator
@@ -43,6 +44,13 @@ def fleet_text(blue=1, red=1, platform="heron", more=""):
 
 def fleet_of(**settings):
     return parse_fleet(fleet_text(**settings))
+
+
+class Unheeded(Shield):
+    """A shield whose decisions nobody heeds: what was wanted is sent."""
+
+    def decide(self, fleet, wanted, surroundings=None):
+        return replace(super().decide(fleet, wanted, surroundings), filtered=wanted)
 
 
 class FakeLink:

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 from bridge_fakes import FakeContacts, World, fleet_of
-from steerclear.shield.bridge.feed import FeedReceiver, Packet
-from steerclear.shield.bridge.feed_packets import Fix, Seal
+from steerclear.shield.bridge.feed import FeedReceiver
+from steerclear.shield.bridge.feed_packets import Fix, Packet, Seal
 from steerclear.shield.bridge.frame import FieldFrame
 from steerclear.shield.bridge.mavlink.signing import SigningClock
 from steerclear.shield.platforms import layout as L

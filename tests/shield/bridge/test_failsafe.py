@@ -2,7 +2,6 @@
 
 import logging
 import math
-import threading
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -230,19 +229,3 @@ def test_an_override_says_what_it_disables_and_ends(caplog):
 def test_no_override_without_an_end_nor_of_the_shield_or_own_navigation(condition, seconds, words):
     with pytest.raises(ConfigError, match=words):
         Operator().override(condition, "", seconds, 0.0)
-
-
-def test_many_threads_at_once():
-    operator = Operator()
-
-    def work(k):
-        for i in range(200):
-            operator.override("contact", f"boat_{k}", 1.0 + i, 0.0)
-            operator.active(0.5)
-
-    threads = [threading.Thread(target=work, args=(k,)) for k in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert len(operator.active(0.5)) == 4

@@ -6,33 +6,39 @@ import math
 import socket
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
-from bridge_fakes import game_of
+from bridge_fakes import FakeLink, game_of
 from fed_world import CLOCK, Deaf
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from logged_runs import Encounter, header_of, numbered
 from steerclear.shield.bridge.clock import ManualClock, MonotonicClock
-from steerclear.shield.bridge.feed import (
-    GONE_S,
-    MAX_SENDERS,
-    MOST_AHEAD,
-    REFEREE_GONE_S,
+from steerclear.shield.bridge.feed import GONE_S, MAX_SENDERS, MOST_AHEAD, REFEREE_GONE_S, FeedReceiver
+from steerclear.shield.bridge.feed_packets import (
+    MAX_BYTES,
+    PUBLISH_EVERY,
+    SEAL_BYTES,
     BoatStatus,
-    FeedReceiver,
     FeedSender,
     Fix,
     FlagStatus,
     GameState,
     Packet,
+    PositionPublisher,
+    Seal,
     game_state,
+    is_sealed,
     parse_packet,
 )
-from steerclear.shield.bridge.feed_packets import MAX_BYTES, SEAL_BYTES, Seal, is_sealed
 from steerclear.shield.bridge.frame import FieldFrame
 from steerclear.shield.bridge.mavlink.signing import TICKS_PER_S
+from steerclear.shield.bridge.messages import TELEMETRY, BoatReading, contacts_heard
 from steerclear.shield.exceptions import BridgeError, ConfigError, FeedError
+from waiting import wait_for
 
 FRAME = FieldFrame(42.0, -71.0, 30.0)
 LOCAL = "127.0.0.1"
@@ -85,6 +91,33 @@ def test_a_fix_becomes_a_contact_in_the_field(receiver):
     assert (found.boat, found.source, found.speed_mps, found.error_m) == ("red_1", "hub", 1.5, 0.5)
     assert found.fixed_s == 99.75
     assert receiver.faults() == {}
+
+
+def test_where_our_boats_are_is_published_now_and_then_and_heard_as_it_was_seen(receiver):
+    sent = []
+    publisher = PositionPublisher(SimpleNamespace(send_positions=sent.append), FRAME, 0.3)
+    ticks = [numbered([*Encounter(header_of(), 1)], number) for number in range(2 * PUBLISH_EVERY)]
+    for tick in ticks:
+        publisher.take(tick)
+    assert len(sent) == 2
+    receiver.take(Packet("deploy_blue", 1, 1, fixes=tuple(sent[0])).encode(), LOCAL)
+    (found,), seen = receiver.read(), ticks[0].readings["blue_1"]
+    assert (*found.position_m, found.heading_rad) == pytest.approx((*seen.position_m, seen.heading_rad), abs=1e-6)
+    assert (found.speed_mps, found.error_m) == (seen.speed_mps, 0.3)
+    assert found.fixed_s == pytest.approx(100.0 - seen.age_s)
+    assert receiver.faults() == {"unknown boat": 1}, "blue_2 is not of this receiver's fleet"
+    blank = {"blue_1": BoatReading("blue_1", 0.0), "blue_2": ticks[0].readings["blue_2"]}
+    publisher.take(replace(ticks[0], readings=blank))
+    assert [fix.boat for fix in sent[-1]] == ["blue_2"], "what nobody knows is not told"
+
+
+def test_a_boat_that_is_only_listened_to_is_a_contact_once_it_has_told_all():
+    link = FakeLink("red_1", ManualClock(100.0), x=3.0, y=4.0, heading_deg=90.0, speed=1.0)
+    (found,) = contacts_heard((), {"red_1": link}, 0.3)
+    assert (found.boat, found.position_m, found.source, found.error_m) == ("red_1", (3.0, 4.0), TELEMETRY, 0.3)
+    assert (found.heading_rad, found.speed_mps, found.fixed_s) == (pytest.approx(math.pi / 2.0), 1.0, 100.0)
+    link.changed = {"speed_mps": math.nan}
+    assert contacts_heard((), {"red_1": link}, 0.3) == ()
 
 
 def test_the_state_of_the_game_comes_through_exactly(receiver):
@@ -465,13 +498,6 @@ def test_fixes_of_packets_that_were_held_back_are_not_fresh(keyed, monkeypatch):
     assert 100.0 - contact.fixed_s == pytest.approx(30.0, abs=0.5)
     assert keyed.faults() == {"late": 1}
     assert "packets of hub come 30.0 s late" in keyed.fault_texts()["late"]
-
-
-def wait_for(condition, limit_s=10.0):
-    end = time.monotonic() + limit_s
-    while not condition():
-        assert time.monotonic() < end, "nothing came"
-        time.sleep(0.005)
 
 
 def hearing(key=None):

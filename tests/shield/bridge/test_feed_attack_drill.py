@@ -9,8 +9,7 @@ from fed_world import CLOCK, FRAME, KEY, PER_TURN, fed_world
 from steerclear.experiments.deploy.proof import prove
 from steerclear.experiments.deploy.tracks import TrackBuilder
 from steerclear.shield.bridge.blackbox import LogReader, McapWriter, header_of_fleet
-from steerclear.shield.bridge.feed import Packet
-from steerclear.shield.bridge.feed_packets import Fix, Seal
+from steerclear.shield.bridge.feed_packets import Fix, Packet, Seal
 
 OFF_M = 25.0
 

@@ -203,13 +203,3 @@ class FakeBoat:
         if self.mode == 15 and message.target_system == self.system_id:
             self.targets.append(message)
             self.speed, self.yaw = math.hypot(message.vx, message.vy), math.atan2(message.vy, message.vx)
-
-
-def wait_for(holds, seconds=10.0):
-    """Whether something holds within that time."""
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        if holds():
-            return True
-        time.sleep(0.01)
-    return bool(holds())

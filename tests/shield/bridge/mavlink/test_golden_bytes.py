@@ -6,13 +6,14 @@ import time
 from pathlib import Path
 
 import pytest
-from fake_boat import FakeBoat, wait_for
+from fake_boat import FakeBoat
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from steerclear.shield.bridge.autopilot_parameters import ASKED
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.frame import FieldFrame
 from steerclear.shield.bridge.mavlink.connection import Endpoint
 from steerclear.shield.bridge.mavlink.vehicle import MavlinkLink
+from waiting import until
 
 GOLDEN = Path(__file__).parents[1] / "data" / "golden_wire.json"
 COMMANDS = [
@@ -56,7 +57,7 @@ def sent_by(route):
         for heading, speed in COMMANDS:
             boat.targets.clear()
             sent = link.send(heading, speed)
-            assert wait_for(lambda: boat.targets)
+            assert until(lambda: boat.targets)
             found = plain(boat.targets[0])
             commands.append([found, round(sent.heading_rad, 12), round(sent.speed_mps, 12), sent.limit_mps])
         said = link.close()
@@ -90,7 +91,7 @@ def read_of():
                 said = link.read()
                 return abs(said.heading_rad - course) < 0.002 and abs(said.speed_mps - 0.1 * k) < 0.006
 
-            assert wait_for(told)
+            assert until(told)
             seen = link.read()
             course_rad = None if math.isnan(seen.course_rad) else round(seen.course_rad, 2)
             found["position"].append([round(v, 3) for v in (*seen.position_m, seen.speed_mps)])

@@ -17,7 +17,6 @@ from steerclear.shield.bridge.clock import ManualClock
 from steerclear.shield.bridge.fleet_settings import ModelLimit
 from steerclear.shield.bridge.frame import FieldFrame
 from steerclear.shield.bridge.mavlink.connection import Endpoint
-from steerclear.shield.bridge.mavlink.signing import Signing
 from steerclear.shield.bridge.mavlink.vehicle import MavlinkLink
 from steerclear.shield.bridge.messages import Sent
 from steerclear.shield.bridge.model_error import ModelErrorMonitor
@@ -27,19 +26,18 @@ from steerclear.shield.platforms import layout as L
 
 STEP_S = 0.06
 LISTEN_S = 0.004
-KEY = bytes(range(32))
 FRAME = FieldFrame(42.0, -71.0)
 
 
 class Lake:
     """One simulated boat and its link."""
 
-    def __init__(self, *, address="", boot_s=0.0, key=None, signing=None, noise=1.0, prepared=True):
+    def __init__(self, *, address="", boot_s=0.0, prepared=True):
         self.clock = ManualClock(1000.0)
         boat = SimBoat("blue_1", start=(40.0, 20.0, 90.0), system_id=7, address=address)
         settings = AutopilotSettings(boot_s=boot_s)
-        self.fleet = SimFleet([boat], clock=self.clock, autopilot=settings, noise=noise, key=key, seed=3)
-        self.endpoint = Endpoint(self.fleet.addresses["blue_1"], self.clock, signing=signing)
+        self.fleet = SimFleet([boat], clock=self.clock, autopilot=settings, noise=1.0, seed=3)
+        self.endpoint = Endpoint(self.fleet.addresses["blue_1"], self.clock)
         self.link = MavlinkLink("blue_1", self.endpoint, 7, FRAME, self.clock, rate_hz=10.0)
         self.command = None
         self.prepared = prepared
@@ -184,14 +182,3 @@ def test_a_second_commander_nobody_hears_is_told_by_what_the_boat_does(lake):
     finally:
         other.close()
     assert took is not None, "the monitor slows it, and gives it up"
-
-
-def test_signed_boats_are_steered_and_ignore_who_does_not_sign():
-    with Lake(key=KEY, signing=Signing(KEY)) as lake:
-        lake.under_way()
-        other = lake.other()
-        other.mav.command_long_send(7, 1, 176, 0, 1, 4, 0, 0, 0, 0, 0)
-        lake.wait(lambda: False, 2.0)
-        other.close()
-        assert lake.link.read().ready
-        assert lake.true_speed() > 0.8

@@ -5,7 +5,7 @@ import math
 import threading
 
 import pytest
-from fake_boat import FakeBoat, wait_for
+from fake_boat import FakeBoat
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.frame import FieldFrame
@@ -14,6 +14,7 @@ from steerclear.shield.bridge.mavlink.signing import Signing
 from steerclear.shield.bridge.mavlink.vehicle import MavlinkLink
 from steerclear.shield.bridge.messages import NEVER_S
 from steerclear.shield.exceptions import LinkError, LinkRefused
+from waiting import until
 
 FRAME = FieldFrame(42.0, -71.0, 30.0)
 TURN = 2.0 * math.pi
@@ -50,9 +51,9 @@ def test_from_nothing_to_steering_to_hold():
         assert (sent.delivered, sent.route) == (True, "SET_ATTITUDE_TARGET")
         assert sent.heading_rad == pytest.approx(1.0, abs=1e-6)
         assert sent.speed_mps == pytest.approx(1.5, abs=1e-6)
-        assert wait_for(lambda: boat.targets)
+        assert until(lambda: boat.targets)
         assert boat.yaw == pytest.approx(1.0 + math.radians(30.0), abs=1e-6), "headings are the field's, courses true"
-        assert wait_for(lambda: link.read().speed_mps > 1.4)
+        assert until(lambda: link.read().speed_mps > 1.4)
         assert link.read().course_rad == pytest.approx(1.0, abs=0.02)
         assert link.close() == "blue_1: in HOLD, speed 0.0 m/s"
         assert boat.mode == 4
@@ -137,7 +138,7 @@ def test_a_hand_that_takes_over_is_noticed_told_once_and_not_fought():
             texts.extend(reading.texts)
             return "mode_changed" in faults and not reading.ready
 
-        assert wait_for(seen)
+        assert until(seen)
         assert faults["mode_changed"] == 1
         assert any("switched it to MANUAL" in text for text in texts)
         for _ in range(3):
@@ -151,10 +152,10 @@ def test_a_boat_given_back_is_ours_again_only_when_it_is_prepared_again(taken):
     with linked() as (boat, link):
         link.read()
         boat.mode, boat.armed = (0, True) if taken == "mode" else (15, False)
-        assert wait_for(lambda: not link.read().ready)
+        assert until(lambda: not link.read().ready)
         boat.mode, boat.armed = 15, True
-        assert wait_for(lambda: "given back" in link.read().why_not)
-        assert not wait_for(lambda: link.read().ready, 0.5), "never by itself"
+        assert until(lambda: "given back" in link.read().why_not)
+        assert not until(lambda: link.read().ready, 0.5), "never by itself"
         assert link.read().released
         link.prepare(20.0)
         assert link.read().ready
@@ -164,11 +165,11 @@ def test_a_boat_given_back_is_ours_again_only_when_it_is_prepared_again(taken):
 def retaken(boat, link):
     """What taking back a boat that its pilot has in MANUAL, disarmed, comes to; given back it is in GUIDED, armed."""
     boat.mode, boat.armed = 0, False
-    assert wait_for(lambda: "it is in MANUAL" in link.read().why_not)
+    assert until(lambda: "it is in MANUAL" in link.read().why_not)
     with pytest.raises(LinkError) as error:
         link.prepare(3.0)
     boat.mode, boat.armed = 15, True
-    assert wait_for(lambda: link.autopilot.mode == "GUIDED" and link.autopilot.is_armed)
+    assert until(lambda: link.autopilot.mode == "GUIDED" and link.autopilot.is_armed)
     return str(error.value), link.read()
 
 
@@ -204,34 +205,34 @@ def test_a_changed_top_speed_is_used_at_once():
         boat.parameters |= {"WHATEVER": 1.0, "WP_SPEED": 4.0}
         boat.send_parameter("WHATEVER")
         boat.send_parameter("WP_SPEED")
-        assert wait_for(lambda: link.autopilot.route.top_mps == 4.0)
+        assert until(lambda: link.autopilot.route.top_mps == 4.0)
         assert "WHATEVER" not in link.health().parameters, "nobody asked for it"
         boat.targets.clear()
         link.send(0.0, 1.0)
-        assert wait_for(lambda: boat.targets)
+        assert until(lambda: boat.targets)
         assert boat.targets[-1].thrust == pytest.approx(0.25)
         boat.parameters["WP_SPEED"] = 0.0
         boat.send_parameter("WP_SPEED")
-        assert wait_for(lambda: not link.read().ready)
+        assert until(lambda: not link.read().ready)
         assert not link.send(0.0, 1.0).delivered
 
 
 def test_a_silent_boat_grows_old_and_is_ready_no_more():
     with linked() as (boat, link):
         boat.speaks = False
-        assert wait_for(lambda: link.read().age_s > 0.5)
-        assert wait_for(lambda: "no heartbeat" in link.read().why_not)
+        assert until(lambda: link.read().age_s > 0.5)
+        assert until(lambda: "no heartbeat" in link.read().why_not)
         boat.speaks = True
-        assert wait_for(lambda: link.read().ready and link.read().age_s < 0.5)
+        assert until(lambda: link.read().ready and link.read().age_s < 0.5)
 
 
 def test_streams_are_asked_for_again_after_a_restart():
     with linked() as (boat, link):
         boat.reboot()
-        assert wait_for(lambda: not link.read().ready)
+        assert until(lambda: not link.read().ready)
         texts = []
-        assert wait_for(lambda: texts.extend(link.read().texts) or any("restarted" in text for text in texts), 20.0)
-        assert wait_for(lambda: link.read().age_s < 0.5, 20.0)
+        assert until(lambda: texts.extend(link.read().texts) or any("restarted" in text for text in texts), 20.0)
+        assert until(lambda: link.read().age_s < 0.5, 20.0)
         assert "MANUAL" in link.read().why_not
         link.prepare(20.0)
         assert link.read().ready
@@ -243,7 +244,7 @@ def test_stopping_never_needs_anything_and_never_raises():
         boat.mode, boat.armed = 15, True
         sent = link.stop()
         assert sent.delivered
-        assert wait_for(lambda: boat.targets)
+        assert until(lambda: boat.targets)
         assert boat.targets[-1].thrust == 0.0
         link.endpoint.close()
         assert not link.stop().delivered
@@ -253,7 +254,7 @@ def test_a_stop_keeps_the_heading_it_has():
     with linked() as (boat, link):
         boat.obeys = False
         boat.yaw = 1.25
-        assert wait_for(lambda: abs(link.autopilot.telemetry.heading[0] - 1.25) < 1e-3)
+        assert until(lambda: abs(link.autopilot.telemetry.heading[0] - 1.25) < 1e-3)
         sent = link.stop()
         assert sent.heading_rad == pytest.approx((1.25 - math.radians(30.0)) % TURN, abs=1e-3)
         assert sent.speed_mps == 0.0
@@ -273,22 +274,9 @@ def test_a_boat_that_does_not_stop_or_cannot_be_held_is_said_so(monkeypatch, boa
     with linked() as (fake, link):
         for name, value in boat.items():
             setattr(fake, name, value)
-        assert wait_for(lambda: link.read().speed_mps >= 0.9 * fake.speed)
+        assert until(lambda: link.read().speed_mps >= 0.9 * fake.speed)
         assert words in link.close()
         assert link.endpoint.is_open is False
-
-
-def test_health_says_what_the_link_knows():
-    with linked() as (boat, link):
-        assert wait_for(lambda: len(link.health().round_trips_s) > 3)
-        health = link.health()
-        assert health.version == (4, 6, 0)
-        assert health.parameters["WP_SPEED"] == 2.0
-        assert health.missing == ""
-        assert health.rates_hz["GLOBAL_POSITION_INT"] > 5.0
-        assert 0.0 <= min(health.round_trips_s) < 1.0
-        boat.send(mavlink.MAVLink_command_ack_message(mavlink.MAV_CMD_DO_SET_MODE, 0, 0, 0, 252, 190))
-        assert wait_for(lambda: math.isfinite(link.health().other_commander_s))
 
 
 def test_texts_in_pieces_come_whole_and_harmless():
@@ -297,7 +285,7 @@ def test_texts_in_pieces_come_whole_and_harmless():
         boat.send(mavlink.MAVLink_statustext_message(4, b"x" * 50, 7, 0))
         boat.send(mavlink.MAVLink_statustext_message(4, b" and \x1b[2J\x07 the rest", 7, 1))
         texts = []
-        assert wait_for(lambda: texts.extend(link.read().texts) or texts)
+        assert until(lambda: texts.extend(link.read().texts) or texts)
         assert texts == ["x" * 50 + " and ?[2J? the rest"]
 
 
@@ -309,12 +297,12 @@ def test_a_fail_safes_mode_change_is_told_from_a_pilots_by_its_word(first):
         for act in acts if first == "word" else reversed(acts):
             act()
             boat.send_heartbeat()
-        assert wait_for(lambda: link.read().released_by == "failsafe")
+        assert until(lambda: link.read().released_by == "failsafe")
         reading = link.read()
         assert "its own fail-safe: EKF failsafe" in reading.why_not
         assert not reading.failsafe_over
         boat.say("EKF failsafe cleared")
-        assert wait_for(lambda: link.read().failsafe_over)
+        assert until(lambda: link.read().failsafe_over)
         link.prepare(20.0)
         assert (link.read().ready, link.read().released_by) == (True, "")
 
@@ -323,15 +311,15 @@ def test_a_pilots_mode_change_is_his_whatever_a_fail_safe_did_before():
     with linked() as (boat, link):
         link.read()
         boat.mode = 0
-        assert wait_for(lambda: link.read().released_by == "pilot")
+        assert until(lambda: link.read().released_by == "pilot")
     with linked() as (boat, link):
         link.read()
         boat.say("Radio Failsafe")
         boat.mode = 4
-        assert wait_for(lambda: link.read().released_by == "failsafe")
-        assert wait_for(lambda: link.autopilot.clock.now_s() - link.autopilot._failed_s > 3.5)
+        assert until(lambda: link.read().released_by == "failsafe")
+        assert until(lambda: link.autopilot.clock.now_s() - link.autopilot._failed_s > 3.5)
         boat.mode = 0
-        assert wait_for(lambda: link.read().released_by == "pilot"), "a hand has it now"
+        assert until(lambda: link.read().released_by == "pilot"), "a hand has it now"
         boat.say("Radio Failsafe Cleared")
-        assert wait_for(lambda: link.read().failsafe_over)
+        assert until(lambda: link.read().failsafe_over)
         assert link.read().released_by == "pilot"

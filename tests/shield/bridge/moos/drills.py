@@ -20,8 +20,9 @@ import time
 from pathlib import Path
 
 sys.path.insert(0, os.path.dirname(__file__))
+sys.path.insert(1, str(Path(__file__).parents[3]))
 
-from moos_boats import fleet_text, sim_of, until
+from moos_boats import fleet_text, sim_of
 from real_db import RealDb
 from steerclear.experiments.sim_boats import moos as boats_of_moos
 from steerclear.shield.bridge.clock import MonotonicClock
@@ -31,6 +32,7 @@ from steerclear.shield.bridge.moos.client import MoosClient
 from steerclear.shield.bridge.moos.links import MoosLinks, MoosNominal
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.platforms import layout as L
+from waiting import until
 
 SPEED_MPS, HEADING_DEG = 1.2, 90.0
 

@@ -1,9 +1,8 @@
 """Simulated boats behind stand-in MOOSDBs, and links to them, for tests."""
 
 import contextlib
-import socket
-import time
 
+from steerclear.experiments.deploy.demo import free_ports
 from steerclear.experiments.sim_boats import SimFleet
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.fleet_file import parse_fleet
@@ -16,21 +15,6 @@ geofence: {xmin_m: -20, ymin_m: -20, xmax_m: 100, ymax_m: 60}
 team: blue
 boats:
 """
-
-
-def until(condition, seconds=6.0):
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        if condition():
-            return True
-        time.sleep(0.01)
-    return False
-
-
-def free_ports(count):
-    with contextlib.ExitStack() as stack:
-        servers = [stack.enter_context(socket.create_server(("127.0.0.1", 0))) for _ in range(count)]
-        return [server.getsockname()[1] for server in servers]
 
 
 def fleet_text(blue=1, red=0, platform="heron", gate="helm", more=""):

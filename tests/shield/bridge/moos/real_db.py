@@ -6,12 +6,12 @@ import subprocess
 import time
 from dataclasses import replace
 
-from moos_boats import until
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.moos.client import MoosClient
 from steerclear.shield.bridge.moos.drivers import VARIABLES
 from steerclear.shield.bridge.moos.gates import HelmGate, PidGate
 from steerclear.shield.bridge.moos.wire import notify
+from waiting import until
 
 
 class Frozen:

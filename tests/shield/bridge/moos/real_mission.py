@@ -21,12 +21,14 @@ from collections import Counter
 from pathlib import Path
 
 from drills import Gate
-from moos_boats import HEAD, free_ports, until
+from moos_boats import HEAD
+from steerclear.experiments.deploy.demo import free_ports
 from steerclear.experiments.deploy.proof import prove
 from steerclear.shield.bridge.blackbox import header_of_fleet
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.bridge.moos.client import MoosClient
+from waiting import until
 
 APPS = (("uSimMarineV22", "uSimMarine"), ("pMarinePIDV22", "pMarinePID"), ("pNodeReporter",), ("pHelmIvP",))
 """Of each kind the first that is installed is played."""

@@ -12,12 +12,13 @@ import threading
 import time
 
 import pytest
-from moos_boats import free_ports, until
+from steerclear.experiments.deploy.demo import free_ports
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.moos import client as client_module
 from steerclear.shield.bridge.moos.client import MoosClient
 from steerclear.shield.bridge.moos.stand_in import StandInDb
 from steerclear.shield.bridge.moos.wire import PROTOCOL, Message, pack_packet, timing
+from waiting import until
 
 logging.getLogger("steerclear").setLevel(logging.ERROR)
 

@@ -4,7 +4,7 @@ import math
 import time
 
 import pytest
-from moos_boats import fleet_of, fleet_text, link_of, sim_of, until
+from moos_boats import fleet_of, fleet_text, link_of, sim_of
 from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.bridge.messages import PILOT
@@ -14,6 +14,7 @@ from steerclear.shield.bridge.moos.links import MoosLinks, MoosNominal
 from steerclear.shield.bridge.preflight_checks import run_checks
 from steerclear.shield.exceptions import ConfigError, FleetFileError, LinkError, LinkRefused
 from steerclear.shield.platforms import layout as L
+from waiting import until
 
 FLEET = fleet_of(1, 1)
 

@@ -7,13 +7,14 @@ import time
 
 import pytest
 from drills import Gate
-from moos_boats import fleet_of, fleet_text, link_of, sim_of, until
+from moos_boats import fleet_of, fleet_text, link_of, sim_of
 from steerclear.experiments.sim_boats import SimFleet
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.bridge.moos.checks import moos_checks
 from steerclear.shield.bridge.preflight_checks import run_checks
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import layout as L
+from waiting import until
 
 WARP = 4.0
 PRECBF = ("DESIRED_RUDDER_PRECBF", "DESIRED_THRUST_PRECBF")
