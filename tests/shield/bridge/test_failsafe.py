@@ -209,7 +209,9 @@ def test_the_page_shows_the_table_that_the_loop_acts_by():
 def test_an_override_says_what_it_disables_and_ends(caplog):
     operator = Operator()
     with caplog.at_level(logging.WARNING):
-        operator.override("contact", "red_1", 30.0, now_s=100.0, by="key")
+        for seconds, subject in ((9.0, "red_1"), (9.0, ""), (30.0, "red_1")):
+            operator.override("contact", subject, seconds, now_s=100.0, by="key")
+        assert [(entry.subject, entry.until_s) for entry in operator.active(100.0)] == [("", 109.0), ("red_1", 130.0)]
         (action,) = operator.actions(110.0)
         assert "20 s more" in action.text
         assert DISABLES["contact"] in action.text

@@ -228,6 +228,7 @@ def test_a_platform_that_the_header_does_not_hold_or_that_has_changed_since_is_t
         *((key, True) for key in ("boats", "number", "readings", "began_s", "has_fleet")),
         *((f"surroundings.{key}", True) for key in ("field", "circles", "polygons", "keep_out")),
         ("surroundings.stops", False),  # which older logs lack
+        *((f"readings.{key}", key != "released") for key in ("mode", "speed_mps", "released")),
     ],
 )
 def test_a_tick_without_a_part_is_refused(part, is_refused):
