@@ -81,17 +81,18 @@ def test_a_long_hunt_is_kept_clear_of_and_who_is_near_after_the_longest_time_is_
 
 
 @pytest.mark.parametrize(
-    ("other", "told"),
+    ("other", "error_m", "told"),
     [
-        ((40.0, 12.0, 0.0, 2.0), True),
-        ((40.0, 12.0, 180.0, 2.0), False),
-        ((40.0, -5.0, 0.0, 2.0), False),  # 11 s away
-        ((45.0, 12.0, 0.0, 2.0), False),  # passes 5 m off
-        ((41.0, 21.0, 0.0, 0.0), False),  # lies still
+        ((40.0, 12.0, 0.0, 2.0), 0.0, True),
+        ((40.0, 12.0, 180.0, 2.0), 0.0, False),
+        ((40.0, -5.0, 0.0, 2.0), 0.0, False),  # 11 s away
+        ((45.0, 12.0, 0.0, 2.0), 0.0, False),  # passes 5 m off
+        ((45.0, 12.0, 0.0, 2.0), 1.5, True),  # may be 3 m nearer: both places are that uncertain
+        ((41.0, 21.0, 0.0, 0.0), 0.0, False),  # lies still
     ],
 )
-def test_who_is_on_the_way_is_told_and_nobody_else_nor_one_not_heard_of_any_more(other, told):
-    world = lying(("red_1", *other)).run(0.2)
+def test_who_is_on_the_way_is_told_and_nobody_else_nor_one_not_heard_of_any_more(other, error_m, told):
+    world = lying(("red_1", *other), f"{END}\nshield: {{position_error_m: {error_m}}}").run(0.2)
     assert bool(near(world)) == told
     world.contacts.silent.add("red_1")
     world.contacts.rows["red_1"][: L.Y + 1] = np.array([0.0, 0.0])

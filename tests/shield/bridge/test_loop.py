@@ -308,4 +308,4 @@ def test_nothing_grows_with_time():
     finally:
         tracemalloc.stop()
     assert after - before < 150_000, "a tick kept each turn would be 2 MB; the interpreter's own free lists are not"
-    assert timing.figures()["read_to_sent_p99_s"] >= 0.0
+    assert set(timing.figures().values()) - {timing.figures()["decide_p99_s"]} == {0.0}, "this clock stands meanwhile"

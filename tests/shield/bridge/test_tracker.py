@@ -62,10 +62,12 @@ def test_a_boat_never_seen_is_left_out_and_one_once_seen_stays():
         (contact(fixed_s=105.0), "future"),
     ],
 )
-def test_impossible_contacts_are_refused_and_said(bad, said):
+def test_impossible_contacts_are_refused_and_said(bad, said, caplog):
     tracker = tracker_with(contact())
-    tracker.update(100.5, {}, [bad])
-    assert said in tracker.faults["red_1"]
+    for _ in range(3):
+        tracker.update(100.5, {}, [bad])
+        assert said in tracker.faults["red_1"]
+    assert [said in line for line in caplog.messages] == [True], "logged once in a while"
     assert tracker.contact_age_s("red_1") == pytest.approx(0.5)
     tracker.update(100.6, {}, [contact(fixed_s=100.6)])
     assert tracker.faults == {}

@@ -115,6 +115,7 @@ def test_tcp_lost_and_opened_again():
 def test_tcpin_takes_one_peer_and_the_next_after_it():
     with closing(TcpWire(Address("tcpin", "127.0.0.1", 0))) as wire:
         wire.open()
+        assert wire.receive() is None, "nobody is waited for"
         for text in (b"first", b"second"):
             with closing(socket.create_connection(("127.0.0.1", wire.port), 5.0)) as boat:
                 boat.sendall(text)

@@ -106,6 +106,7 @@ def test_the_gate_after_the_pid_passes_what_the_shield_leaves_alone_bit_for_bit(
         nominal = gate.nominal(reading(now))
         posted = gate.encode(nominal.heading_rad, nominal.speed_mps, reading(now))
         assert posted == {"DESIRED_RUDDER": rudder, "DESIRED_THRUST": thrust}
+        assert k or nominal.heading_rad > reading().heading_rad, "a rudder to starboard is a course to starboard"
     assert nominal.speed_mps == pytest.approx(2.25)
 
 
