@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 from steerclear import policies
 from steerclear.env.config import GameConfig
+from steerclear.policies.submissions.stage import ENTRY_FILE
 from steerclear.shield.exceptions import ConfigError
 
 from . import cli_options as o
@@ -39,8 +40,14 @@ GAMES, QUICK_GAMES, QUICK_TIME_S = 5, 2, 200.0
 
 def check_path(entry: str) -> None:
     """Refuse (ConfigError) what is no path of an entry but a policy's name or a model."""
+    path = Path(entry)
+    if path.suffix == ".py" and path.name != ENTRY_FILE:
+        words = f"copy it into a folder of its own as {ENTRY_FILE}, with the class solution, and give the folder"
+        raise ConfigError(f"{entry} is no entry; {words}; or play it as it is: steerclear evaluate {entry}")
     if not is_entry(entry) or entry.startswith("sb3:"):
-        raise ConfigError(f"{entry} is no entry; give a folder or a zip with solution.py, such as ./{entry}.zip")
+        there = [f"./{name}" for name in (entry, f"{entry}.zip") if Path(name).exists()]
+        hint = f"; did you mean {there[0]}?" if there else ""
+        raise ConfigError(f"{entry} is no entry; give a folder or a zip with {ENTRY_FILE}{hint}")
 
 
 @app.command()

@@ -1,9 +1,11 @@
-"""Files named on a command line: none is both read and written, and none that is there is written over."""
+"""What a command line names: files, none both read and written, none written over; options, as errors tell them."""
 
 from __future__ import annotations
 
+import re
 import typing
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from inspect import Parameter
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +46,7 @@ def check_files(function: Callable[..., Any], given: Mapping[str, Any]) -> None:
             ``--json`` cannot be written, or one to write is there.
     """
     hints = hints_of(function)
-    spelled = {name: _spelling(name, hint) for name, hint in hints.items()}
+    spelled = {name: spelling(name, hint) for name, hint in hints.items()}
     check_apart({spelled.get(name, name): value for name, value in given.items()})
     check_json_file(given.get("json_file"))
     folders = [
@@ -120,6 +122,29 @@ def _files(value: Any) -> Iterator[Path]:
             continue
 
 
+def as_typed(text: str, options: Iterable[Parameter], given: Mapping[str, Any]) -> str:
+    """Return an error's text with options as they were typed in place of the settings that it begins with.
+
+    ``delay_s is -1.0; give ...`` becomes ``--delay is -1.0; give ...``, unless the setting itself was typed, by an
+    option that takes KEY=VALUE.
+
+    Args:
+        text: of the error.
+        options: of the command, with their defaults.
+        given: the values of options by name.
+    """
+    begin = re.match(r"[a-z][\w-]*(, [\w-]+)*(?= (is|would|has|must) )", text)
+    pairs = [pair for value in given.values() if isinstance(value, list) for pair in value if isinstance(pair, str)]
+    keys = {pair.partition("=")[0].strip() for pair in pairs}
+    typed = {one.name: spelling(one.name, one.annotation) for one in options if given[one.name] != one.default}
+
+    def named(word: str) -> str:
+        option = re.sub(r"_(m|s|mps)$", "", word).replace("-", "_")
+        return word if word in keys else typed.get(option, word)
+
+    return text if begin is None else ", ".join(map(named, begin[0].split(", "))) + text[begin.end() :]
+
+
 def hints_of(function: Callable[..., Any]) -> dict[str, Any]:
     """Hints of a function as written: Python 3.10 puts an Optional round what is annotated and None by default."""
     hints = typing.get_type_hints(function, include_extras=True)
@@ -130,7 +155,7 @@ def hints_of(function: Callable[..., Any]) -> dict[str, Any]:
     return hints
 
 
-def _spelling(name: str, hint: Any) -> str:
+def spelling(name: str, hint: Any) -> str:
     """An argument as users write it: its option, or its name."""
     for info in typing.get_args(hint)[1:]:
         if isinstance(info, OptionInfo):

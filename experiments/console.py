@@ -19,7 +19,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from steerclear.shield.exceptions import SteerclearError
 from typer.core import TyperCommand, TyperOption
 
-from .cli_files import check_files, hints_of
+from .cli_files import as_typed, check_files, hints_of
 from .runner import Interrupted as Interrupted
 from .terminal import SafeConsole
 from .workers import JobFault, fault_words, interrupted_by_signals, machine_words
@@ -208,6 +208,7 @@ def command(**defaults: Any) -> Made:
         @functools.wraps(function)
         def guarded(**given: Any) -> Any:
             logging.captureWarnings(True)
+            typed = dict(given)
             try:
                 check_files(guarded, given)
                 for name, group in groups.items():
@@ -215,7 +216,7 @@ def command(**defaults: Any) -> Made:
                 with interrupted_by_signals():
                     return function(**given)
             except SteerclearError as error:
-                _leave(f"error: {error}", ExitCode.BAD_INPUT)
+                _leave(f"error: {as_typed(str(error), options, typed)}", ExitCode.BAD_INPUT)
             except JobFault as error:
                 _leave(f"error: {error}", ExitCode.FAULT)
             except Interrupted as error:

@@ -8,7 +8,7 @@ from .actions import HOLD, ActionReader, to_command
 from .adapters import from_agents, from_callable
 from .entrants import Entrant, entrant, entrants
 from .fingerprint import fingerprint
-from .guard import Failure, GuardedTeam, PolicyReport
+from .foreign import Failure, GuardedTeam, PolicyReport
 from .protocol import Action, BatchPolicy, TeamPolicy
 from .registry import check, describe, make, make_batch, names
 from .sb3 import load_sb3

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from steerclear.shield.exceptions import PolicyError
 
-from .guard import Answer, ForeignCode, GuardedTeam
+from .foreign import Answer, ForeignCode, GuardedTeam
 
 AgentFactory = Callable[[str, Any], Any]
 """``factory(agent_id, env) -> agent`` with ``compute_action(obs, info)``."""
@@ -51,6 +51,14 @@ class AgentsCode(ForeignCode):
     def __init__(self, agents: Mapping[str, Any] | AgentFactory) -> None:
         if not callable(agents) and not isinstance(agents, Mapping):
             raise PolicyError("agents must be a dict agent_id -> agent, or a function of (agent_id, env)")
+        if isinstance(agents, type) and not any(hasattr(agents, name) for name in ("compute_action", "__getattr__")):
+            name = agents.__name__
+            raise PolicyError(
+                f"class {name} has no compute_action(obs, info); define it, or give a function that builds what has "
+                f"one: lambda agent_id, env: {name}(agent_id, env)"
+            )
+        if isinstance(agents, Mapping):
+            _check_agents(agents)
         self._source = agents
         self._agents: dict[str, Any] = {}
 
@@ -61,16 +69,20 @@ class AgentsCode(ForeignCode):
             self._agents = {agent_id: self._source[agent_id] for agent_id in agent_ids}
         else:
             self._agents = {agent_id: self._source(agent_id, env) for agent_id in agent_ids}
-        for agent_id, agent in self._agents.items():
-            if not callable(getattr(agent, "compute_action", None)):
-                raise PolicyError(f"agent {agent_id} ({type(agent).__name__}) has no compute_action(obs, info)")
-            fault = call_fault(agent.compute_action, ("obs", "info"))
-            if fault is not None:
-                raise PolicyError(f"compute_action of agent {agent_id} ({type(agent).__name__}) {fault}")
+            _check_agents(self._agents)
 
     def prepare(self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]) -> Answer:
         """Return the answers of each boat's agent."""
         return lambda agent_id: self._agents[agent_id].compute_action(observations, infos)
+
+
+def _check_agents(agents: Mapping[str, Any]) -> None:
+    for agent_id, agent in agents.items():
+        if not callable(getattr(agent, "compute_action", None)):
+            raise PolicyError(f"agent {agent_id} ({type(agent).__name__}) has no compute_action(obs, info)")
+        fault = call_fault(agent.compute_action, ("obs", "info"))
+        if fault is not None:
+            raise PolicyError(f"compute_action of agent {agent_id} ({type(agent).__name__}) {fault}")
 
 
 class CallableCode(ForeignCode):
@@ -114,7 +126,7 @@ def from_agents(agents: Mapping[str, Any] | AgentFactory, name: str = "agents") 
         name: name for records and reports.
 
     Raises:
-        PolicyError: neither a dict nor callable.
+        PolicyError: neither a dict nor callable, or an agent or the class has no ``compute_action``.
     """
     return GuardedTeam(name, AgentsCode(agents))
 

@@ -19,7 +19,7 @@ import numpy as np
 from steerclear.shield.exceptions import PolicyError
 from steerclear.shield.extras import install_command
 
-from .guard import Answer, ForeignCode, GuardedTeam, game_facts
+from .foreign import Answer, ForeignCode, GuardedTeam, game_facts
 from .submissions.stage import ENTRY_FILE, check_members
 
 ALGORITHMS = ("PPO", "A2C", "DQN", "SAC", "TD3", "DDPG")

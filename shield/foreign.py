@@ -89,10 +89,12 @@ def describe_error(error: BaseException) -> str:
     The place is the last line of foreign code that ran. If a library or this package raised, that place follows.
     """
     try:
-        text = plain_text(error)
+        text = plain_text(error.msg if isinstance(error, SyntaxError) else error)
     except Exception:  # its own __str__ may raise, too
         text = "(no text)"
     lines = [(frame.f_code.co_filename, line) for frame, line in traceback.walk_tb(error.__traceback__)]
+    if isinstance(error, SyntaxError) and error.filename:  # not the line that ran, but the one that does not
+        lines = [(error.filename, error.lineno or 1)]
     theirs = [place for place in lines if not place[0].startswith(_OURS) and not any(k in place[0] for k in _LIBRARIES)]
     places = [f"{file}:{line}" for file, line in dict.fromkeys([*theirs[-1:], *lines[-1:]])]
     return plain_text(f"{type(error).__name__}: {text}" + f" ({', raised in '.join(places)})" * bool(places), 900)

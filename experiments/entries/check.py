@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from steerclear.env.config import GameConfig
-from steerclear.policies.guard import PolicyReport
+from steerclear.policies.foreign import PolicyReport
 from steerclear.policies.submissions.made_for import made_for
 from steerclear.shield.exceptions import PolicyError
 

@@ -17,7 +17,7 @@ from typing import Any, cast
 
 import numpy as np
 from steerclear import policies
-from steerclear.policies.guard import ForeignCode, GameFacts, GuardedTeam
+from steerclear.policies.foreign import ForeignCode, GameFacts, GuardedTeam
 from steerclear.shield.exceptions import SteerclearError
 from steerclear.shield.foreign import describe_error, plain_text
 

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from steerclear import policies
 from steerclear.policies.actions import HOLD, Fault, SeenGame
-from steerclear.policies.guard import ForeignTeam, game_facts
+from steerclear.policies.foreign import ForeignTeam, game_facts
 from steerclear.policies.protocol import TeamPolicy
 from steerclear.policies.registry import SB3_PREFIX, WEIGHTS_PREFIX, looks_like_path
 from steerclear.policies.sb3 import trained_here

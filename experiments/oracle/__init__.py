@@ -22,8 +22,7 @@ Usage (all arrays are float64)::
   ``verdict.plan`` (the avoiding commands), ``both.responsible`` (`Responsible`).
 """
 
-from typing import Any
-from warnings import warn
+from steerclear.shield.renamed import old_names
 
 from .boat_model import N_STATE, Boat
 from .judge import judge, judge_violation, judge_violations
@@ -52,8 +51,4 @@ _OLD = {
 }
 
 
-def __getattr__(name: str) -> Any:
-    if name not in _OLD:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    warn(f"{name} is now {_OLD[name]}; the old name goes with the next release", DeprecationWarning, stacklevel=2)
-    return globals()[_OLD[name]]
+__getattr__ = old_names(globals(), _OLD)

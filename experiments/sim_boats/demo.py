@@ -33,7 +33,7 @@ def off_platform(platform: Platform, share: float, boat: str, seed: int) -> Plat
         PlatformError: the resulting boat cannot be steered.
     """
     if not 0.0 <= share <= LARGEST:
-        raise ConfigError(f"boats cannot be off by {share:g}; give a share from 0 to {LARGEST:g}, such as 0.2")
+        raise ConfigError(f"off is {share:g}; give a share from 0 to {LARGEST:g}, such as 0.2")
     if share == 0.0:
         return platform
     rng = np.random.default_rng([seed, crc32(boat.encode())])

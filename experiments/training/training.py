@@ -15,7 +15,7 @@ from steerclear.env.whole_file import whole_file
 from steerclear.policies.entrants.learned import batch_of
 from steerclear.policies.entrants.learned.network import Network, write_weights
 from steerclear.shield.exceptions import ConfigError, SteerclearError
-from steerclear.shield.wrappers.tallies import EVENTS, Tallies, changed_by
+from steerclear.shield.wrappers.tallies import EVENTS, OWN_EVENTS, Tallies, changed_by
 
 from ..provenance import machine, versions
 from ..result_files import told_settings, write_table
@@ -205,7 +205,8 @@ def play_games(
         tallies.count(going, changed_by(shield, boats, (games, len(boats))))
         going &= ~(core.terminated | core.truncated)
     counts = tallies.step.mean(axis=2)
-    counts[6:] = tallies.step[6:].sum(axis=2)
+    whole = [EVENTS.index(name) for name in OWN_EVENTS]
+    counts[whole] = tallies.step[whole].sum(axis=2)
     rows = [dict(zip(EVENTS, column.tolist(), strict=True)) for column in counts.T]
     return [{"net": row["captures"] - row["captures_against"], **row} for row in rows]
 

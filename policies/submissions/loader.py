@@ -19,7 +19,7 @@ from steerclear.shield.foreign import describe_error, plain_text
 
 from ..actions import SeenGame, seen_game
 from ..adapters import call_fault
-from ..guard import Answer, ForeignCode, GameFacts, GuardedTeam
+from ..foreign import Answer, ForeignCode, GameFacts, GuardedTeam
 from .made_for import MadeFor, check_game, made_for, words_of_less
 from .sandbox import Sandbox
 from .stage import ENTRY_FILE, MAX_BYTES, Stage
@@ -27,6 +27,7 @@ from .stage import ENTRY_FILE, MAX_BYTES, Stage
 logger = logging.getLogger(__name__)
 CONFIG_FILE, CLASS_NAME, METHOD_NAME = "gen_config.py", "solution", "compute_action"
 ARGUMENTS = ("agent_id", "full_obs_normalized", "full_obs", "global_state")
+_MEANING = "full_obs_normalized and full_obs are dicts by agent id, global_state is one dict of the whole game"
 ARGUMENTS_OF_2024 = 3
 """(agent_id as a number, observation_normalized, observation), both of that boat alone."""
 FAILURE_NAME = "steerclear_failure"
@@ -126,7 +127,7 @@ def check_interface(instance: Any, source: object) -> None:
         inspect.signature(method).bind(*range(ARGUMENTS_OF_2024))
         old = "it looks like the interface of 2024, whose observations this game does not make: port it, and "
         remedy = f"{old}{remedy}"
-    raise PolicyError(f"{METHOD_NAME} of {source} {fault}; {remedy}, the last three being dicts keyed by agent id")
+    raise PolicyError(f"{METHOD_NAME} of {source} {fault}; {remedy}: {_MEANING}")
 
 
 class SubmissionCode(ForeignCode):
@@ -228,7 +229,8 @@ class SubmissionCode(ForeignCode):
         remedy = ""
         if isinstance(error, ModuleNotFoundError):
             remedy = f"; install {error.name!r} here or put it beside {ENTRY_FILE}"
-        return PolicyError(f"submission {self.stage.source}: {what}: {describe_error(error)}{remedy}")
+        why = describe_error(error).replace(str(self.stage.folder), str(self.stage.source))  # not the copy that ran
+        return PolicyError(f"submission {self.stage.source}: {what}: {why}{remedy}")
 
 
 def seed_libraries(seed: int) -> None:

@@ -36,7 +36,7 @@ class MonotonicClock:
 
     def __init__(self, speed: float = 1.0) -> None:
         if not 0.0 < speed < 1e6:
-            raise ConfigError(f"clock speed is {speed}; give a number > 0, 1 for real time")
+            raise ConfigError(f"speed is {speed}; give a number > 0, 1 for real time")
         self.speed = float(speed)
 
     def now_s(self) -> float:

@@ -59,7 +59,7 @@ class Problem:
     def __post_init__(self) -> None:
         sub_steps(self.dt_s)
         if not (self.dt_s <= self.horizon_s < math.inf):
-            raise TableError(f"the horizon of a table is {self.horizon_s} s; make it finite and >= {self.dt_s} s")
+            raise TableError(f"horizon_s is {self.horizon_s}; make it finite and >= {self.dt_s} s")
 
     @property
     def name(self) -> str:

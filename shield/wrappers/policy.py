@@ -12,6 +12,7 @@ from ..commands import Commands
 from ..decision import Decisions
 from ..exceptions import ConfigError, FleetError, PolicyError
 from ..fleet import Fleet
+from ..foreign import describe_error
 from ..platforms import layout as L
 from ..shield import Shield
 from .actions import team_answer
@@ -207,7 +208,8 @@ class ShieldedCallable:
             self._note(f"commands of {named} are not finite; they hold" if named else "")
             self._relative = wanted.relative
         except Exception as error:  # whatever the policy does, its boats must get commands
-            self._note(f"{type(error).__name__}: {error}; all boats hold")
+            ours = isinstance(error, PolicyError)
+            self._note(f"{f'PolicyError: {error}' if ours else describe_error(error)}; all boats hold")
             stop = np.zeros((len(fleet), 2))
             if not self._relative:
                 stop[:, 1] = np.radians(fleet.state[:, L.HEADING])

@@ -1,5 +1,6 @@
 """Foreign code plays boat by boat, whatever it does the game goes on, and what cannot be called is refused at load."""
 
+import importlib
 import logging
 import time
 
@@ -42,6 +43,28 @@ def test_a_function_gets_each_boats_observation_and_its_actions_pass_unchanged(g
     assert run(team, game)[0] == {"agent_0": 0, "agent_1": 1, "agent_2": 2}
     with pytest.raises(PolicyError, match="no function for agent_3"):
         team.reset(game[0], ["agent_3"], 0)
+
+
+class NoAgent:
+    """Nothing that plays."""
+
+
+@pytest.mark.parametrize(
+    ("agents", "words"),
+    [
+        (NoAgent, r"class NoAgent has no compute_action\(obs, info\); define it, or give a function"),
+        ({"agent_0": NoAgent()}, r"agent agent_0 \(NoAgent\) has no compute_action"),
+    ],
+)
+def test_what_has_no_compute_action_is_refused_before_a_game(agents, words):
+    with pytest.raises(PolicyError, match=words):
+        policies.from_agents(agents)
+
+
+def test_the_earlier_module_of_foreign_code_warns():
+    guard = importlib.import_module("steerclear.policies.guard")
+    with pytest.warns(DeprecationWarning, match="'steerclear.policies.guard' is now 'steerclear.policies.foreign'"):
+        assert guard.GuardedTeam is policies.GuardedTeam
 
 
 class Both:

@@ -174,7 +174,10 @@ def test_the_seed_decides_a_submissions_random_numbers(game, write_entry, load):
     ("solution", "message"),
     [
         ("import no_such_package_xyz\n", r"cannot be imported: ModuleNotFoundError.*install 'no_such_package_xyz'"),
-        ("class solution(:\n", r"solution.py cannot be imported: SyntaxError"),
+        (
+            "import math\nclass solution(:\n",
+            r"solution.py cannot be imported: SyntaxError: [a-z ]+ \(\S*entry/solution.py:2\)$",
+        ),
         ("raise SystemExit(0)\n", r"cannot be imported: SystemExit"),
         ("class Solution:\n    pass\n", r"has no class 'solution'"),
         ("solution = 4\n", r"has no class 'solution'"),
