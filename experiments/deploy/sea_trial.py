@@ -32,10 +32,11 @@ Wanted = tuple[float, float]
 
 @dataclass
 class Leg:
-    """State of a manoeuvre: its initial heading, deg turned since, clockwise, and zig-zag legs done."""
+    """State of a manoeuvre: its initial heading, deg turned since, clockwise, most of it, and zig-zag legs done."""
 
     base_deg: float
     turned_deg: float = 0.0
+    most_deg: float = 0.0
     count: int = 0
 
 
@@ -68,9 +69,15 @@ def _zigzag(leg: Leg, into_s: float, heading_deg: float) -> Wanted | None:
 
 
 def _circle(side: float, leg: Leg, into_s: float, heading_deg: float) -> Wanted | None:
+    """Ask for a heading ahead of the boat that never goes back.
+
+    Where the platform is wrong, estimated headings jump with each fix. A heading controller with a derivative answers
+    each jump, and what is logged is the phase of its clock, not the boat.
+    """
     if abs(leg.turned_deg) >= CIRCLE_DEG or into_s > 45.0:
         return None
-    return 0.8, heading_deg + CARROT_DEG * side
+    leg.most_deg = max(leg.most_deg, side * leg.turned_deg)
+    return 0.8, heading_deg + side * (CARROT_DEG + leg.most_deg - side * leg.turned_deg)
 
 
 MANOEUVRES: tuple[tuple[str, float, Steer], ...] = (

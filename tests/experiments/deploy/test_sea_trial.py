@@ -5,7 +5,7 @@ import types
 
 import numpy as np
 import pytest
-from steerclear.experiments.deploy.sea_trial import MANOEUVRES, SeaTrial, longest_s
+from steerclear.experiments.deploy.sea_trial import MANOEUVRES, Leg, SeaTrial, longest_s
 from steerclear.experiments.fit.runs import NEEDED, Streams, silent
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.bridge.messages import Snapshot
@@ -44,7 +44,7 @@ def driven(platform, boats=("one",), start=(10.0, 0.0)):
     return trial, told, np.array(rows)
 
 
-@pytest.mark.parametrize("platform", ["ardurover_boat", "otter", "heron"])
+@pytest.mark.parametrize("platform", ["ardurover_boat", "otter", "heron", "heron_v22"])
 def test_every_manoeuvre_is_driven_inside_the_geofence(platform):
     trial, told, rows = driven(platform)
     assert trial.done
@@ -54,6 +54,16 @@ def test_every_manoeuvre_is_driven_inside_the_geofence(platform):
     assert rows[:, 2].min() > -30.0
     assert rows[:, 2].max() < 70.0
     assert len(rows) * 0.1 < 15 * 60.0
+
+
+@pytest.mark.parametrize(("name", "side"), [("starboard", 1.0), ("port", -1.0)])
+def test_a_turning_circle_goes_on_ahead_of_headings_that_jump_back(name, side):
+    (steer,) = [steer for title, _, steer in MANOEUVRES if title == f"turning circle to {name}"]
+    leg, asked = Leg(0.0), []
+    for heading in (10.0, 19.0, 15.0, 24.0, 20.0, 29.0):
+        leg.turned_deg = side * (heading - 10.0)
+        asked.append(side * steer(leg, 1.0, side * heading)[1])
+    assert asked == pytest.approx([85.0, 94.0, 94.0, 99.0, 99.0, 104.0])
 
 
 def test_the_trial_shows_turns_and_stops_of_both_sides():

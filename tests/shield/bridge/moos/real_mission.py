@@ -4,8 +4,8 @@ The helms of all six drive lanes that cross; ours put RAW_ before their DESIRED_
 What is measured is where the simulators say the boats are. NODE_REPORTs go from boat to boat by a relay of ours, as
 uFldNodeComms does it on a shoreside. Whoever imports this asks `missing` first: without MOOS there is nothing to play.
 
-The boats' platform is that of their simulator: one that was fitted to it (`fit` does it again) by the steps of the page
-on a boat of your own. `alone` runs those steps' commands, such as the preflight that sees whether it fits.
+The boats' platform is that of their simulator. `fit` makes one by the steps of the page on a boat of your own; `alone`
+runs those steps' commands, such as the preflight that sees whether it fits.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from waiting import until
 
 APPS = (("uSimMarineV22", "uSimMarine"), ("pMarinePIDV22", "pMarinePID"), ("pNodeReporter",), ("pHelmIvP",))
 """Of each kind the first that is installed is played."""
-PLATFORMS = {"uSimMarineV22": str(Path(__file__).with_name("usimmarine_v22.yaml")), "uSimMarine": "heron"}
+PLATFORMS = {"uSimMarineV22": "heron_v22", "uSimMarine": "heron"}
 """What describes the boats that each simulator moves, with the settings below."""
 NAMES = ("blue_1", "blue_2", "blue_3", "red_1", "red_2", "red_3")
 LANES = (
@@ -44,7 +44,7 @@ LANES = (
     ((74.0, 36.0), (6.0, 4.0)),
 )
 """Where each boat begins, and whereto it drives, and back again, m: every lane of ours crosses lanes of theirs."""
-SPEED_MPS, SEPARATION_M, START_S = 1.2, 2.5, 60.0
+SPEED_MPS, SEPARATION_M, POSITION_ERROR_M, START_S = 1.2, 2.5, 0.3, 60.0
 APART_M = 0.25
 """Two simulators tell places of up to 0.1 s apart: so much less than the true distance may be measured."""
 MISSION = """\
@@ -215,7 +215,7 @@ def fleet_text(boats: Boats, platform: str | None = None) -> str:
         link = f'kind: moos, address: "moos://127.0.0.1:{port}", mission: "{boats.mission(name)}"'
         link = f", link: {{{link}}}" if name.startswith("blue") else ""
         lines.append(f'  - {{name: {name}, {side}, platform: "{platform}"{link}}}')
-    return "\n".join([*lines, "shield: {delay_s: 0.2, position_error_m: 0.3}"]) + "\n"
+    return "\n".join([*lines, f"shield: {{delay_s: 0.2, position_error_m: {POSITION_ERROR_M:g}}}"]) + "\n"
 
 
 def alone(command: str, folder: Path, platform: str | None = None) -> subprocess.CompletedProcess[str]:
