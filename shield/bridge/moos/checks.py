@@ -18,7 +18,7 @@ from ..link_checks import LONGEST_TRIP_S, OLDEST_S, WATCH_S, Watch, check_spread
 from ..messages import BoatReading
 from ..preflight_checks import Check, Found, checks_by_kind
 from .client import Health
-from .nav import REFUSED, VARIABLES
+from .state import REFUSED, VARIABLES
 from .vehicle import MoosLink, client_name
 
 APART_M = 5.0  # NAV_X, NAV_Y and NAV_LAT, NAV_LONG agree within this

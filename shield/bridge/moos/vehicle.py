@@ -14,12 +14,11 @@ from ...exceptions import LinkError, LinkRefused
 from ..clock import Clock
 from ..frame import TWO_PI, FieldFrame
 from ..messages import NEVER_S, PILOT, BoatReading, Link, Sent, check_finite, never
-from . import drivers, nav
+from . import drivers, state
 from .client import Health, MoosClient
-from .contacts import MoosContacts
 from .drivers import Drivers
 from .gates import Gate, Nominal
-from .nav import Navigation
+from .state import MoosContacts, Navigation
 from .wire import Message, WireError
 
 LOG = logging.getLogger(__name__)
@@ -83,7 +82,7 @@ class MoosLink(Link):
         self._last_rad, self._sent_s = 0.0, math.inf
         self._prepared = self._closed = False
         self.writers: dict[str, set[str]] = {}
-        names = (*nav.VARIABLES, *nav.PLACE, *drivers.VARIABLES, *gate.inputs, *gate.outputs, REPORT)
+        names = (*state.VARIABLES, *state.PLACE, *drivers.VARIABLES, *gate.inputs, *gate.outputs, REPORT)
         self.client = MoosClient(client_name(boat), host, port, clock, names, self._hear, self._forget)
 
     def connect(self, timeout_s: float) -> None:
@@ -261,7 +260,7 @@ class MoosLink(Link):
             sources = self.writers.setdefault(key, set())
             if len(sources) < MOST_TEXTS:
                 sources.add(message.source)
-            is_place = key in nav.VARIABLES or key in nav.PLACE
+            is_place = key in state.VARIABLES or key in state.PLACE
             text = ""
             if not math.isfinite(true_s) and (is_place or key == REPORT):
                 return  # MOOS time is not known yet

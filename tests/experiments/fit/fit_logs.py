@@ -4,7 +4,10 @@ import math
 import struct
 
 import numpy as np
+from logged_runs import START_S, header_of
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from steerclear.shield.bridge.blackbox import McapWriter
+from steerclear.shield.bridge.messages import BoatReading, Sent, Tick
 from steerclear.shield.platforms import fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L
 
@@ -122,4 +125,17 @@ def as_bin(path, rows, left_out=(), receivers=()):
                 file.write(b"\xa3\x95" + bytes([number]) + struct.pack(form, stamp, *values))
 
 
-WRITERS = {"csv": as_csv, "alog": as_alog, "tlog": as_tlog, "bin": as_bin}
+def as_mcap(path, rows):
+    """A black box of ours, a turn of the loop for each row."""
+    writer = McapWriter(path, header_of(), capacity=len(rows) + 10)
+    for number, (time_s, x, y, heading, speed, told_speed, told_heading) in enumerate(rows):
+        now_s = START_S + time_s
+        reading = BoatReading("blue_1", now_s, (x, y), 0.0, math.radians(heading), 0.0, speed, velocity_age_s=0.0)
+        sent = Sent("blue_1", now_s, math.radians(told_heading), told_speed, "fake", True)
+        told = {"readings": {"blue_1": reading}, "sent": {"blue_1": sent}}
+        parts = {"fleet": None, "nominal": None, "surroundings": None, "decisions": None, "shield_reset": False}
+        writer.take(Tick(number, now_s, now_s, now_s, contacts=(), policy_age_s=0.0, **told, **parts))
+    writer.close()
+
+
+WRITERS = {"csv": as_csv, "alog": as_alog, "tlog": as_tlog, "bin": as_bin, "mcap": as_mcap}

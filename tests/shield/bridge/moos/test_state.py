@@ -7,8 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from steerclear.shield.bridge.fleet_settings import ContactLimit
 from steerclear.shield.bridge.frame import FieldFrame
-from steerclear.shield.bridge.moos.contacts import MoosContacts, parse_report
-from steerclear.shield.bridge.moos.nav import Navigation
+from steerclear.shield.bridge.moos.state import MoosContacts, Navigation, parse_report
 from steerclear.shield.bridge.moos.wire import Message
 from steerclear.shield.bridge.tracker import ContactFusion
 
