@@ -105,7 +105,7 @@ class SimFleet(Closing):
     """Simulated boats. As a context manager, it starts the thread on entry and releases all resources on exit.
 
     Simulated time starts at 0 and is counted in seconds of ``clock``. Policies start to steer their boats once all
-    other boats of the game have been commanded for 5 s (see ``waits``).
+    other boats of the game have been commanded for 5 s (see ``waits`` and `play`).
 
     Args:
         boats: the boats to simulate.
@@ -215,6 +215,11 @@ class SimFleet(Closing):
     def truth(self) -> TruthRecord | None:
         """The record so far; None without ``record`` or before the game begins."""
         return self._world.truth
+
+    def play(self) -> None:
+        """Begin the game: policies and record start immediately."""
+        with self._lock:
+            self._world.play()
 
     def states(self) -> dict[str, Array]:
         """Return the true state row (N_STATE,) of each boat, all at the same time."""

@@ -42,7 +42,7 @@ class Message:
 
     kind: str  # one letter, such as `NOTIFY`
     key: str = ""  # name of the variable
-    data: str = DOUBLE  # `DOUBLE`, `STRING` or `BINARY`
+    data: str = DOUBLE  # `DOUBLE` or `STRING`; other letters are of no use to us
     source: str = ""  # name of the client that posted it; a MOOSDB acts for the client named here
     time_s: float = -1.0  # when the value was valid, s of MOOS time
     value: float = -1.0  # of a double; -1 otherwise

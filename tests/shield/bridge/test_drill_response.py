@@ -129,8 +129,7 @@ def test_boats_take_turns_and_stay_inside_the_fence(good):
         assert np.ptp(trail, axis=0).max() > 5.0
 
 
-@pytest.mark.parametrize("preset", ["aamas2024", "mctf2025"])
-@pytest.mark.parametrize("platform", ["heron", "ardurover_boat"])
+@pytest.mark.parametrize(("platform", "preset"), [("heron", "aamas2024"), ("ardurover_boat", "mctf2025")])
 def test_boats_at_the_games_start_line_can_be_drilled_there(platform, preset):
     """None is led where another one disturbs its drill."""
     game = GameConfig.preset(preset, team_size=3)
