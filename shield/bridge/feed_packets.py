@@ -23,6 +23,7 @@ from pydantic import AfterValidator, Field, TypeAdapter, ValidationError
 from ..exceptions import ConfigError, FeedError
 from .frame import FieldFrame
 from .mavlink.signing import SigningClock
+from .mavlink.transport import host_and_port
 from .messages import Closing, Tick
 
 LOG = logging.getLogger(__name__)
@@ -384,11 +385,10 @@ def socket_address(text: str) -> tuple[str, int]:
     Raises:
         ConfigError: it is not of that form.
     """
-    host, colon, port = text.rpartition(":")
-    host = host.removeprefix("[").removesuffix("]")
-    if not colon or not host or not port.isdecimal() or int(port) > 65535:
+    place = host_and_port(text)
+    if place is None:
         raise ConfigError(f'{text!r} is no address; give "HOST:PORT", such as "127.0.0.1:14700"')
-    return host, int(port)
+    return place
 
 
 def family_of(host: str) -> socket.AddressFamily:

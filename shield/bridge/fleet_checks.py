@@ -2,31 +2,24 @@
 
 from __future__ import annotations
 
-import ipaddress
 import math
-import re
 from collections.abc import Iterator, Mapping
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 from ..config import ShieldConfig
-from ..exceptions import ConfigError, FleetFileError
+from ..exceptions import ConfigError, FleetFileError, LinkError
 from ..platforms import Gains, Platform, get_platform
 from ..renamed import current_settings
 from ..surroundings import Surroundings
 from .fleet_settings import FleetSettings, MoosLinkSettings
+from .mavlink.transport import host_and_port, parse_address
 
 if TYPE_CHECKING:
     from .fleet_file import FleetFile
 
-LINK_KINDS = ("udpin", "udpout", "tcp", "tcpin", "serial")
 MOOS = "moos://"
 LEAST_MOOS_HZ = 5.0
-
-_HOST = r"[A-Za-z0-9_-]{1,63}(\.[A-Za-z0-9_-]{1,63}){0,15}\.?|\[[0-9A-Fa-f:.]{2,45}(%[A-Za-z0-9]{1,16})?\]"
-_ADDRESS = re.compile(rf"(?P<host>{_HOST}):(?P<port>[0-9]{{1,5}})")
-_NUMERIC = re.compile(r"(^|\.)(0[xX][0-9A-Fa-f]*|[0-9]+)\.?$|[\[\]]")
-_DEVICE = re.compile(r"[^:]+(:[0-9]{1,7})?")
 
 
 def check_fleet(fleet: FleetFile) -> None:
@@ -107,21 +100,10 @@ def address_of(text: str, key: str) -> tuple[str, int]:
     Raises:
         FleetFileError: it is not of that form.
     """
-    found = _ADDRESS.fullmatch(text)
-    if found is None or not 0 < int(found["port"]) < 65536 or not _is_host(found["host"]):
+    place = host_and_port(text)
+    if place is None or place[1] == 0:
         raise FleetFileError(f'{key} is {text!r}; give "HOST:PORT", such as "127.0.0.1:14700"')
-    return found["host"], int(found["port"])
-
-
-def _is_host(host: str) -> bool:
-    """Whether a host means one thing: what ends in a number is a plain address, not one in octal (010.0.0.1) or cut."""
-    if not _NUMERIC.search(host):
-        return True
-    try:
-        ipaddress.ip_address(host.strip("[]"))
-    except ValueError:
-        return False
-    return True
+    return place
 
 
 def _agents(fleet: FleetFile) -> Iterator[str]:
@@ -170,18 +152,16 @@ def _links(fleet: FleetFile) -> Iterator[str]:
         if link is None:
             continue
         shared = f"system_id, {link.system_id}, on {link.address}"
-        kind, colon, rest = link.address.partition(":")
         if isinstance(link, MoosLinkSettings):
             yield from _moos_link(fleet, name, link)
             address_of(link.address.removeprefix(MOOS), f"{name}: link address {MOOS}...")
             shared = f"MOOSDB, {link.address}"
-        elif kind not in LINK_KINDS or not colon:
-            kinds = f"{', '.join(f'{k}:...' for k in LINK_KINDS)}, such as udpin:127.0.0.1:14550, or {MOOS}HOST:PORT"
-            yield f"{name}: link address {link.address!r}; give one of {kinds}"
-        elif kind != "serial":
-            address_of(rest, f"{name}: link address")
-        elif not _DEVICE.fullmatch(rest):
-            yield f"{name}: link address {link.address!r}; give serial:DEVICE:BAUD, such as serial:/dev/ttyUSB0:57600"
+        else:
+            try:
+                if parse_address(link.address).number == 0:
+                    yield f"{name}: link address {link.address!r} ends in 0; give its port, or its baud rate"
+            except LinkError as error:
+                yield f"{name}: {error}; for a boat that runs MOOS {MOOS}HOST:PORT"
         other = seen.setdefault((link.address, link.system_id), boat.name)
         if other != boat.name:
             yield f"boats {other!r} and {boat.name!r} have one {shared}; give each its own"

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import ipaddress
 import os
+import re
 import socket
 from dataclasses import dataclass
 from typing import Any
@@ -16,6 +18,10 @@ from ...exceptions import LinkError
 
 KINDS = ("udpin", "udpout", "tcp", "tcpin", "serial")
 DEFAULT_BAUD = 57_600
+_HOST = r"[A-Za-z0-9_-]{1,63}(\.[A-Za-z0-9_-]{1,63}){0,15}\.?|\[[0-9A-Fa-f:.]{2,45}(%[A-Za-z0-9]{1,16})?\]"
+_PLACE = re.compile(rf"(?P<host>{_HOST}):(?P<port>[0-9]{{1,5}})")
+_NUMERIC = re.compile(r"(^|\.)(0[xX][0-9A-Fa-f]*|[0-9]+)\.?$|[\[\]]")
+_DEVICE = re.compile(r"(?P<name>[^:]+)(:(?P<baud>[0-9]{1,7}))?")
 
 Peer = tuple[str, int]  # who sent: host and port; on wires with one end, always the same
 
@@ -48,19 +54,34 @@ def parse_address(text: str) -> Address:
         LinkError: it is none of them.
     """
     kind, _, rest = text.partition(":")
-    if kind not in KINDS or not rest:
-        raise LinkError(
-            f"link address {text!r} is none; give udpin:, udpout:, tcp:, tcpin:HOST:PORT or serial:DEVICE:BAUD"
-        )
-    host, colon, number = rest.rpartition(":")
-    is_number = bool(colon) and number.isascii() and number.isdigit()
+    if kind not in KINDS:
+        kinds = f"{', '.join(f'{kind}:...' for kind in KINDS)}, such as udpin:127.0.0.1:14550"
+        raise LinkError(f"link address {text!r}; give one of {kinds}")
+    device, place = _DEVICE.fullmatch(rest), host_and_port(rest)
+    if kind == "serial" and device is not None:
+        return Address(kind, device["name"], int(device["baud"] or DEFAULT_BAUD))
     if kind == "serial":
-        return Address(kind, host, int(number)) if is_number else Address(kind, rest, DEFAULT_BAUD)
-    if not host or not is_number or int(number) > 65535:
-        raise LinkError(
-            f"link address {text!r} has no host and port; give {kind}:HOST:PORT, such as {kind}:127.0.0.1:14550"
-        )
-    return Address(kind, host.strip("[]"), int(number))
+        raise LinkError(f"link address {text!r}; give serial:DEVICE:BAUD, such as serial:/dev/ttyUSB0:57600")
+    if place is None:
+        raise LinkError(f"link address {text!r}; give {kind}:HOST:PORT, such as {kind}:127.0.0.1:14550")
+    return Address(kind, *place)
+
+
+def host_and_port(text: str) -> tuple[str, int] | None:
+    """Host and port of HOST:PORT; None: it is not of that form, or its host means more than one thing.
+
+    An IPv6 host stands in brackets. What ends in a number is a plain address, not one in octal (010.0.0.1) or cut.
+    """
+    found = _PLACE.fullmatch(text)
+    if found is None or int(found["port"]) > 65535:
+        return None
+    host = found["host"].strip("[]")
+    if _NUMERIC.search(found["host"]):
+        try:
+            ipaddress.ip_address(host)
+        except ValueError:
+            return None
+    return host, int(found["port"])
 
 
 class Wire:

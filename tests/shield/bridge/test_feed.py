@@ -518,7 +518,7 @@ def test_what_cannot_be_sent_and_addresses_that_are_none_are_one_clear_error(rec
             sender.send_positions([Fix("red_1", math.nan, 0.0, 0.0, 0.0, 0.0, 0.0)])
         with pytest.raises(FeedError, match="fewer boats"):
             sender.send_positions([Fix("b" * 60, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)] * 250)
-    for address, words in (("127.0.0.1", "no address"), ("no such host.invalid:9", "nobody knows the host")):
+    for address, words in (("127.0.0.1", "no address"), ("no-such-host.invalid:9", "nobody knows the host")):
         with pytest.raises(ConfigError, match=words):
             FeedSender("hub", [address])
     with pytest.raises(BridgeError, match=r"cannot hear the feed at .* give another address"):

@@ -10,6 +10,7 @@ import pytest
 from bridge_fakes import fleet_of, fleet_text
 from steerclear.experiments.sim_boats.demo import demo_text
 from steerclear.shield import ShieldConfig
+from steerclear.shield.bridge.fleet_checks import address_of
 from steerclear.shield.bridge.fleet_file import load_fleet, parse_fleet
 from steerclear.shield.bridge.fleet_yaml import LONGEST_TEXT, MOST_BYTES, read_settings
 from steerclear.shield.exceptions import FleetFileError
@@ -101,6 +102,7 @@ WRONG = [
     (LINK, '"udpin:127.0.0.1:²"', "blue_1"),
     (LINK, '"serial:/dev/ttyUSB0:²"', "serial:DEVICE:BAUD"),
     (LINK, '"serial::9600"', "serial:DEVICE:BAUD"),
+    (LINK, '"udpin:127.0.0.1:0"', "ends in 0; give its port"),
     ("agent_0", "agent_٣", "agent"),
 ]
 
@@ -277,6 +279,7 @@ def test_what_is_no_fleet_file_is_refused_at_once_in_little_memory(name):
 @pytest.mark.parametrize("host", ["127.0.0.1", "[::1]", "[fe80::1%eth0]", "localhost", "boat-1.local", "a1.b2", "1a"])
 def test_hosts_that_mean_one_thing_are_taken(host):
     assert parse_fleet(GOOD.replace("127.0.0.1:14700", f"{host}:14700")).feed.listen == f"{host}:14700"
+    assert address_of(f"{host}:14700", "feed.listen") == (host.strip("[]"), 14700), "as sockets take it"
 
 
 @pytest.mark.parametrize("kind", ["folder", "device", "pipe", "none", "nul", "latin", "large", "long name"])

@@ -59,7 +59,11 @@ def test_addresses_that_are(text, address):
 
 
 @pytest.mark.parametrize(
-    "text", ["", "udp:127.0.0.1:14550", "udpin:", "udpin:14550", "tcp:host:", "tcp:host:99999", "tcp:host:1٣", "com3"]
+    "text",
+    [
+        *("", "udp:127.0.0.1:14550", "udpin:", "udpin:14550", "tcp:host:", "tcp:host:99999", "tcp:host:1٣", "com3"),
+        *("tcp:010.0.0.1:1", "tcp:[::zz]:1", "tcp:a b:1", "serial:", "serial::9600", "serial:/dev/ttyS0:fast"),
+    ],
 )
 def test_addresses_that_are_not(text):
     with pytest.raises(LinkError, match="give"):
