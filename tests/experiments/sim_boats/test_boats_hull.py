@@ -62,6 +62,18 @@ def test_a_stop_of_the_autopilot_is_hard_or_the_platforms():
     assert own.state[L.Y] > 1.5 * hard.state[L.Y]
 
 
+def test_backs_up_and_stays():
+    boat = hull(speed_mps=1.0)
+    places = []
+    for _ in range(400):
+        boat.obey(Keep(back_up_m=2.0))
+        places.append(boat.state[L.Y])
+    assert max(places) - places[-1] == pytest.approx(2.0, abs=0.15)
+    assert places[-1] == places[-50]
+    fastest = max(a - b for a, b in itertools.pairwise(places)) / 0.1
+    assert fastest == pytest.approx(0.34, abs=0.02)
+
+
 def test_returns_when_the_current_sets_it_off():
     boat = hull()
     boat.drift_mps = (0.3, 0.0)
