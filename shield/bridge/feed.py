@@ -127,7 +127,7 @@ class FeedReceiver(Closing):
         self._closing, self._closed = threading.Event(), False
         self._socket = _hearing_socket(listen)
         host, port = self._socket.getsockname()[:2]
-        self.address = f"{host}:{port}"
+        self.address = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
         self._thread = threading.Thread(target=self._hear, name="feed", daemon=True)
         self._thread.start()
 

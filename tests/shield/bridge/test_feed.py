@@ -529,6 +529,15 @@ def test_what_cannot_be_sent_and_addresses_that_are_none_are_one_clear_error(rec
         FeedReceiver("127.0.0.1:0", FRAME, ManualClock(), allow=["somewhere"])
 
 
+def test_the_feed_is_heard_over_ipv6_at_the_address_it_names():
+    try:
+        receiver = FeedReceiver("[::1]:0", FRAME, MonotonicClock(), allow=["::1"], boats=("red_1",))
+    except BridgeError:
+        pytest.skip("this machine has no IPv6")
+    with receiver, FeedSender("hub", [receiver.address]) as sender:
+        wait_for(lambda: sender.send_positions([TRUE]) or time.sleep(0.01) or receiver.read())
+
+
 def test_a_flood_is_dropped_and_afterwards_packets_are_fresh_again():
     with hearing() as receiver, FeedSender("hub2", [receiver.address]) as sender:
         stop = threading.Event()
