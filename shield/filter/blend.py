@@ -89,9 +89,11 @@ TRIALS = 3
 def _mildest_turn(i: int, scene: Scene) -> float:
     """Return the turn nearest to the nominal one, deg: 0 where nominal turn and backup go to opposite sides.
 
-    A turn against the backup would have to be undone in the next step.
+    A turn against the backup would have to be undone in the next step. One of a boat that lies still costs nothing.
     """
     nominal, backup = scene.checked_turn[i], scene.verified[i, TURN]
+    if backup == 0.0 and scene.next_state[i, L.SPEED] == 0.0:
+        return nominal
     if nominal * backup <= 0.0:
         return 0.0
     return nominal if abs(nominal) < abs(backup) else backup

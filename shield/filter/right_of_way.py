@@ -2,8 +2,9 @@
 
 Two boats on nearly the same course may each want to go where the other is. Every decision is then safe, and neither
 boat ever arrives: a deadlock. The symmetry is broken as in the rules of the road, by what each boat sees of the other.
-The boat behind, or with the other on its starboard side, gives way and turns away; the other holds its course. The
-shield checks these commands like any others.
+The boat behind, or with the other on its starboard side, gives way and turns away; the other holds its course. Boats
+that can stop at once may stand still before each other instead. Each of them then goes round the other, which it keeps
+to port: a roundabout. The shield checks these commands like any others.
 
 An opponent does not follow this rule; whole backups clear it.
 
@@ -43,6 +44,12 @@ STILL_MPS = 0.2
 """A boat with a nominal speed up to this does not want to go anywhere."""
 PATIENCE = 3.0
 """Factor on the waiting time of a boat with right of way before it gives way nevertheless."""
+GOES_ROUND = 2.0
+"""Value of ``memory[i, GIVES_WAY]`` of a boat that goes round another; -1 and 1 are turns away to port, to starboard."""
+ROUND_DEG = 95.0
+"""Course round another boat, from its bearing to starboard: a little outward, so that the distance does not shrink."""
+ON_COURSE_DEG = 10.0
+"""A boat that goes round another turns where it lies until its course is as near as this."""
 
 
 @lean_kernel
@@ -84,12 +91,38 @@ def _stands_on(i: int, j: int, state: Array) -> bool:
 
 
 @lean_kernel
+def _stands(i: int, speed_mps: float, scene: Scene) -> bool:
+    """Return whether boat i lies still although it wants to go somewhere."""
+    return speed_mps > STILL_MPS and abs(scene.state[i, L.SPEED]) <= STILL_MPS
+
+
+@lean_kernel
+def _still_near(i: int, scene: Scene) -> int:
+    """Return the teammate that boat i stopped for if it is still alongside; -1 for none."""
+    j = int(scene.memory[i, W.BLOCKED_BY])
+    if j < 0 or not scene.ours[j] or not scene.neighbours[i, j]:
+        return -1
+    gap = math.hypot(scene.state[j, L.X] - scene.state[i, L.X], scene.state[j, L.Y] - scene.state[i, L.Y])
+    return j if gap < scene.radius[i, j] + NEAR_M else -1
+
+
+@lean_kernel
+def _is_ahead(i: int, j: int, turn_deg: float, state: Array) -> bool:
+    """Return whether boat j is not yet abaft boat i's beam on its nominal course."""
+    course = math.radians(state[i, L.HEADING] + turn_deg)
+    dx, dy = state[j, L.X] - state[i, L.X], state[j, L.Y] - state[i, L.Y]
+    return dx * math.sin(course) + dy * math.cos(course) > 0.0
+
+
+@lean_kernel
 def _who_blocks(i: int, turn_deg: float, speed_mps: float, scene: Scene) -> int:
     """Return the boat that still keeps boat i from turning as it wants; -1 for none."""
     state, memory = scene.state, scene.memory
     if memory[i, W.HAS_BACKUP] == 0.0 or memory[i, W.DEADLOCK_S] <= 0.0 or memory[i, W.FREE_S] > FREED_S:
         return -1
     turned_deg = wrap_degrees(state[i, L.HEADING] - memory[i, W.DEADLOCK_DEG])
+    if _stands(i, speed_mps, scene):
+        return _still_near(i, scene)
     if turned_deg * math.copysign(1.0, turn_deg) >= TURNED_DEG:
         return -1
     return _alongside(i, turn_deg, speed_mps, scene)
@@ -105,7 +138,11 @@ def _goes_on(i: int, turn_deg: float, speed_mps: float, scene: Scene) -> bool:
     if speed_mps <= STILL_MPS or memory[i, W.DEADLOCK_S] >= LONGEST_S:
         return False
     gap = math.hypot(state[j, L.X] - state[i, L.X], state[j, L.Y] - state[i, L.Y])
-    return turn_deg * memory[i, W.GIVES_WAY] < 0.0 and gap < scene.radius[i, j] + CLEAR_M
+    if memory[i, W.GIVES_WAY] == GOES_ROUND:
+        wants = _is_ahead(i, j, turn_deg, state)
+    else:
+        wants = turn_deg * memory[i, W.GIVES_WAY] < 0.0
+    return wants and gap < scene.radius[i, j] + CLEAR_M
 
 
 @lean_kernel
@@ -123,6 +160,10 @@ def _press(i: int, turn_deg: float, speed_mps: float, scene: Scene) -> None:
     if memory[j, W.GIVES_WAY] != 0.0 and int(memory[j, W.BLOCKED_BY]) == i:
         return
     memory[i, W.DEADLOCK_S] += tuning.dt_s
+    if _stands(i, speed_mps, scene):
+        if memory[i, W.DEADLOCK_S] >= tuning.deadlock_timeout_s:
+            memory[i, W.GIVES_WAY], memory[i, W.DEADLOCK_S] = GOES_ROUND, tuning.dt_s
+        return
     patience = PATIENCE if _stands_on(i, j, state) else 1.0
     if memory[i, W.DEADLOCK_S] >= patience * tuning.deadlock_timeout_s:
         memory[i, W.GIVES_WAY], memory[i, W.DEADLOCK_S] = -math.copysign(1.0, turn_deg), tuning.dt_s
@@ -131,7 +172,7 @@ def _press(i: int, turn_deg: float, speed_mps: float, scene: Scene) -> None:
 @lean_kernel
 def apply_right_of_way(i: int, scene: Scene) -> None:
     """Replace boat i's nominal command if it has been kept from turning for long enough."""
-    tuning, memory = scene.tuning, scene.memory
+    state, tuning, memory = scene.state, scene.tuning, scene.memory
     speed_mps, turn_deg = scene.command[i, 0], wrap_degrees(scene.command[i, 1])
     if memory[i, W.GIVES_WAY] != 0.0 and not _goes_on(i, turn_deg, speed_mps, scene):
         memory[i, W.GIVES_WAY], memory[i, W.DEADLOCK_S] = 0.0, 0.0
@@ -141,7 +182,14 @@ def apply_right_of_way(i: int, scene: Scene) -> None:
         _press(i, turn_deg, speed_mps, scene)
         if memory[i, W.GIVES_WAY] == 0.0 and memory[i, W.DEADLOCK_S] < tuning.deadlock_timeout_s:
             return
-    scene.command[i, 1] = AWAY_DEG * memory[i, W.GIVES_WAY]
+    if memory[i, W.GIVES_WAY] == GOES_ROUND:
+        j = int(memory[i, W.BLOCKED_BY])
+        bearing = math.atan2(state[j, L.X] - state[i, L.X], state[j, L.Y] - state[i, L.Y])
+        scene.command[i, 1] = wrap_degrees(math.degrees(bearing) + ROUND_DEG - state[i, L.HEADING])
+        if abs(scene.command[i, 1]) > ON_COURSE_DEG:
+            scene.command[i, 0] = 0.0
+    else:
+        scene.command[i, 1] = AWAY_DEG * memory[i, W.GIVES_WAY]
     scene.reason[i] = W.RIGHT_OF_WAY
 
 
@@ -164,9 +212,12 @@ def note_deadlock(i: int, scene: Scene) -> None:
     if scene.reason[i] < W.LEAST_CHANGE or scene.reason[i] > W.BEST_EFFORT or j < 0 or unchanged(i, scene):
         return
     turn_deg, speed_mps = wrap_degrees(scene.checked[i, 1]), scene.checked[i, 0]
-    if _alongside(i, turn_deg, speed_mps, scene) != j:
+    stands = _stands(i, speed_mps, scene) and scene.ours[j]
+    if not stands and _alongside(i, turn_deg, speed_mps, scene) != j:
         return
     memory[i, W.FREE_S] = 0.0
     if memory[i, W.DEADLOCK_S] == 0.0:
+        if stands:
+            memory[i, W.BLOCKED_BY] = j
         memory[i, W.DEADLOCK_S] = tuning.dt_s
         memory[i, W.DEADLOCK_DEG] = state[i, L.HEADING]

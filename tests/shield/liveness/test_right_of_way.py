@@ -58,6 +58,18 @@ def test_boats_that_cross_in_the_middle_all_arrive():
     assert (run.reason == Reason.RIGHT_OF_WAY).any()
 
 
+@pytest.mark.parametrize(("boats", "radius_m"), [(2, 30.0), (3, 40.0), (6, 40.0)])
+@pytest.mark.parametrize("coordination", ["team", "per_boat"])
+def test_boats_that_can_stop_at_once_go_round_each_other(boats, radius_m, coordination):
+    """Else half of the threes and sixes stand still before each other for good."""
+    random = np.random.default_rng(0)
+    angle = on_a_circle(boats, random.uniform(0.0, 6.0, 6)) + random.normal(size=(6, boats)) / radius_m
+    at, run = to_the_other_side("si", angle, radius_m, 600, coordination=coordination)
+    assert at[..., 0].max() < 550
+    assert run.closest(np.ones(boats, bool)).min() >= 2.5
+    assert (run.reason == Reason.RIGHT_OF_WAY).any() or boats == 2
+
+
 @pytest.mark.study
 @pytest.mark.parametrize("boats", [3, 4, 12])
 @pytest.mark.parametrize(("platform", "radius_m"), [("heron", 30.0), ("surveyor", 80.0)])
