@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -29,7 +28,7 @@ from .filter.backup_switch import back_up
 from .filter.blend import any_may_be_blended, blend, rescore_backups
 from .filter.last_line import keep_last_line, note_last_resorts
 from .filter.nominal import check_nominal, close_groups, make_groups, open_group
-from .filter.program import Program, Solver
+from .filter.program import Solver, SolverCall
 from .filter.qp import ROUNDS, accept, among_mates, begin_program, end_program, linearise, solve
 from .filter.right_of_way import forget_deadlock, note_deadlock
 from .jit import Array, BoolArray, copy_row, kernel, lean_kernel
@@ -272,18 +271,14 @@ def end(scene: Scene) -> bool:
 
 
 @lean_kernel
-def decide_scene(scene: Scene, solve_rows: Any) -> None:
-    """Make the whole decision: filtered commands go to ``scene.command``, reasons to ``scene.reason``.
-
-    ``solve_rows`` solves the QP of a number of boats and rows, as `qp.solve` does. Another solver than that runs this
-    same function in Python, see `Deciders.decide`.
-    """
+def decide_scene(scene: Scene) -> None:
+    """Make the whole decision: filtered commands go to ``scene.command``, reasons to ``scene.reason``."""
     while True:
         for group in range(begin(scene)):
             count, safe = begin_group(group, scene), False
             for _ in range(ROUNDS if count > 0 else 0):
                 rows = linearise(count, scene)
-                if rows < 0 or not solve_rows(count, rows, scene):
+                if rows < 0 or not solve(count, rows, scene):
                     break
                 safe = accept(count, scene)
                 if safe:
@@ -298,17 +293,8 @@ def decide_all(scene: Scene) -> None:
     """All decisions, one after another."""
     for b in range(scene.given.shape[0]):
         load_decision(b, scene)
-        decide_scene(scene, solve)
+        decide_scene(scene)
         store_decision(b, scene)
-
-
-def _solve_by(solver: Solver, count: int, rows: int, scene: Scene) -> bool:
-    """Solve the QP of so many boats and rows by another solver, as `qp.solve` does; return whether there is one."""
-    n = 2 * count
-    z = solver(Program(scene.C[:rows, :n], scene.d[:rows], scene.z0[:n]))
-    if z is not None:
-        scene.z[:n] = z
-    return z is not None
 
 
 class Deciders:
@@ -334,13 +320,19 @@ class Deciders:
     ) -> None:
         self._delay = steps_of_delay(config)
         self.scene = new_scene(number, boats, static, tuning_of(config), self._delay)
-        self._solver, self._threads = solver, max(1, min(threads, number))
+        self._solver, self._threads = solver, max(1, min(threads, number)) if solver is None else 1
+        self._solver_call: SolverCall | None = None
         self._decide_all: Any = None
         self._parts: list[Scene] = []
         self._pool: ThreadPoolExecutor | None = None
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_decide_all": None, "_parts": [], "_pool": None}  # those are of one process
+        return self.__dict__ | {
+            "_decide_all": None,
+            "_parts": [],
+            "_pool": None,
+            "_solver_call": None,
+        }  # those are of one process
 
     @property
     def remembered(self) -> dict[str, Array]:
@@ -364,12 +356,9 @@ class Deciders:
         """Write into the scene what is decided about what is given, beside these static constraints."""
         self.beside(static)
         if self._solver is not None:
-            in_python, solve_rows = getattr(decide_scene, "py_func", decide_scene), partial(_solve_by, self._solver)
-            for b in range(len(self.scene.given)):
-                load_decision(b, self.scene)
-                in_python(self.scene, solve_rows)
-                store_decision(b, self.scene)
-            return
+            if self._solver_call is None:
+                self._solver_call = SolverCall(self._solver, self.scene)
+            self.scene.solver_address[0] = self._solver_call.address
         if self._decide_all is None:
             made = getattr(decide_all, "compile", None)  # there is none where NUMBA_DISABLE_JIT is set
             self._decide_all = decide_all if made is None else made((type_of(self.scene),))  # saves 3 us a call
@@ -377,6 +366,8 @@ class Deciders:
             self._decide_all(self.scene)
         else:
             self._decide_in_threads()
+        if self._solver_call is not None:
+            self._solver_call.raise_what_was_raised()
 
     def _decide_in_threads(self) -> None:
         """Share the decisions; each thread has its own scratch and counts its own faults of registered barriers."""

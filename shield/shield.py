@@ -138,8 +138,8 @@ class Shield:
         """
         if fleet is not None and not isinstance(fleet, Fleet):
             raise FleetError(f"warm_up takes a Fleet, not {type(fleet).__name__}; build it with Fleet.of(...)")
-        for twin in (Shield(solver=self.config.solver), Shield(self.config)):  # its settings may leave no room
-            twin.decide(*_tight_spot())
+        twin = Shield(self.config)
+        twin.decide(*_tight_spot())
         if fleet is not None:
             fleet.check()
             twin._deciders_of(fleet, twin._static(OPEN_WATER))
@@ -416,7 +416,7 @@ def _parts(name: str) -> list[tuple[int, str, str]]:
 
 
 def _tight_spot() -> tuple[Fleet, Commands, Surroundings]:
-    """Return two boats that meet head on between static constraints of each kind, and a far opponent: all code runs."""
+    """Return two boats that meet head on between obstacles, which a QP solver is asked about, and a far opponent."""
     fleet = Fleet.of(
         position_m=[(0.0, 0.0), (0.0, 4.2), (300.0, 3.0)],
         heading_rad=[0.0, np.pi, -np.pi / 2],

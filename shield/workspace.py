@@ -249,6 +249,7 @@ class Scene(NamedTuple):
     C: Annotated[Array, "rows", "2n"]
     d: Annotated[Array, "rows"]
     dual: Annotated[Array, "rows"]
+    solver_address: Annotated[IntArray, 1]  # of the solver to call, see `filter.program`; 0: the compiled one
 
 
 MOST_ROWS = 3000

@@ -2,11 +2,13 @@
 
     minimise 1/2 |z - z0|^2   subject to   C z >= d
 
-with scaled inputs z (see `qp`). An answer counts only if it satisfies every row by residuals computed here.
+with scaled inputs z (see `qp`). An answer counts only if it satisfies every row by residuals computed here. Compiled
+code calls these solvers through an address: there is one decision for all of them.
 """
 
 from __future__ import annotations
 
+import ctypes
 import logging
 import warnings
 from collections.abc import Callable
@@ -15,9 +17,14 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import config
+from numba.extending import intrinsic
 
 from ..exceptions import SolverError
 from ..jit import Array
+from ..workspace import Scene
 
 logger = logging.getLogger(__name__)
 
@@ -99,3 +106,55 @@ def solve(program: Program, solver: str) -> Array | None:
     if not isinstance(answer, np.ndarray) or answer.shape != program.z0.shape or answer.dtype != np.float64:
         return None
     return answer if program.holds(answer) else None
+
+
+PLAIN = bool(getattr(config, "DISABLE_JIT", False))
+_FORM = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
+_CALLED: dict[int, Callable[[int, int], int]] = {}
+"""Functions by number where nothing is compiled."""
+
+
+class SolverCall:
+    """A solver as compiled code calls it for the program in a scene; keep it while that may happen."""
+
+    def __init__(self, solver: Solver, scene: Scene) -> None:
+        self._solver, self._scene = solver, scene
+        self._raised: BaseException | None = None
+        self._function = _FORM(self._answer)
+        self.address = int(ctypes.cast(self._function, ctypes.c_void_p).value or 0)
+        if PLAIN:
+            _CALLED[self.address] = self._answer
+
+    def _answer(self, count: int, rows: int) -> int:
+        """Write the solution of the program of so many boats and rows into the scene; return whether there is one."""
+        scene, n = self._scene, 2 * count
+        try:
+            z = self._solver(Program(scene.C[:rows, :n], scene.d[:rows], scene.z0[:n]))
+        except BaseException as error:  # compiled code passes none on
+            z, self._raised = None, error
+        if z is not None:
+            scene.z[:n] = z
+        return int(z is not None)
+
+    def raise_what_was_raised(self) -> None:
+        """Raise what a solver raised since the last call of this."""
+        raised, self._raised = self._raised, None
+        if raised is not None:
+            raise raised
+
+
+@intrinsic
+def _call(context: Any, address: Any, count: Any, rows: Any) -> Any:
+    """Call a `SolverCall`."""
+
+    def build(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+        address, count, rows = given
+        whole = ir.IntType(64)
+        form = ir.FunctionType(whole, [whole, whole])
+        return builder.call(builder.inttoptr(address, form.as_pointer()), [count, rows])
+
+    return types.int64(types.int64, types.int64, types.int64), build
+
+
+call_solver: Any = (lambda address, count, rows: _CALLED[address](count, rows)) if PLAIN else _call
+"""``call_solver(address, count, rows)``: 1 if the solver has an answer, else 0, in compiled code."""

@@ -34,6 +34,7 @@ from ..workspace import BY_QP, LEAST_CHANGE, ROW_COST, STOPPED, Scene, all_spent
 from .backup_switch import list_movers
 from .blend import LITTLE_M, SCORE, before_opponent, keeps_backup_scores, note_verified, restore_verified, satisfies_all
 from .nominal import predict_and_score
+from .program import call_solver
 
 STATIC_AIM_M = 1e-3
 """Rows of static constraints aim this much beyond the target, so that the exact check does not fail by rounding."""
@@ -236,7 +237,9 @@ def linearise(count: int, scene: Scene) -> int:
 
 @lean_kernel
 def solve(count: int, rows: int, scene: Scene) -> bool:
-    """Solve the QP by projection; return False when it has no solution."""
+    """Solve the QP, by projection if no other solver is to be called; return False when it has no solution."""
+    if scene.solver_address[0] != 0:
+        return bool(call_solver(scene.solver_address[0], count, rows))
     n = 2 * count
     return project(scene.C[:rows, :n], scene.d[:rows], scene.z0[:n], scene.z[:n], scene.dual[:rows])
 

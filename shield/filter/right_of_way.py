@@ -45,7 +45,7 @@ STILL_MPS = 0.2
 PATIENCE = 3.0
 """Factor on the waiting time of a boat with right of way before it gives way nevertheless."""
 GOES_ROUND = 2.0
-"""Value of ``memory[i, GIVES_WAY]`` of a boat that goes round another; -1 and 1 are turns away to port, to starboard."""
+"""``memory[i, GIVES_WAY]`` of a boat that goes round another; -1 and 1 are turns away to port and to starboard."""
 ROUND_DEG = 95.0
 """Course round another boat, from its bearing to starboard: a little outward, so that the distance does not shrink."""
 ON_COURSE_DEG = 10.0

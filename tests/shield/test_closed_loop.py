@@ -1,6 +1,8 @@
 """Boats under the shield, sailed on: the distance is kept wherever the certificate says it can be."""
 
+import copy
 import math
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -100,6 +102,31 @@ def test_a_boat_sent_out_for_ever_stays_in_by_absolute_headings(name, around):
     assert 79.0 < highest < 80.0
 
 
+def herons(seed, side_m, gap_m, speed, turn_deg, steps, shield=None):
+    """Six herons of ours with wants of their own, and how they sail."""
+    random = np.random.default_rng(seed)
+    state = scattered(random, 1, ["heron"] * 6, side_m, gap_m=gap_m, speed=(0.0, 1.0))[0]
+    wants = np.column_stack([random.uniform(*speed, 6), random.uniform(-turn_deg, turn_deg, 6)])
+    return wants, sail(shield or Shield(), fleet_of(state[:, SEEN], [0] * 6), lambda _step, _state: wants, steps)
+
+
+def six_near(solver, seed):
+    """How six herons sail that are near enough for programs."""
+    return herons(seed, 24.0, 4.0, (0.5, 2.0), 20.0, 80, Shield(solver=solver))[1]
+
+
+@pytest.fixture
+def backend(monkeypatch):
+    """Puts another function in place of those of qpsolvers; returns the list of its calls."""
+
+    def put(solve_qp):
+        asked = []
+        monkeypatch.setattr(qpsolvers, "solve_qp", lambda *a, **kw: (asked.append(a), solve_qp(*a, **kw))[1])
+        return asked
+
+    return put
+
+
 def answers_nonsense(*arguments, **settings):
     return np.full(4, np.nan)
 
@@ -112,21 +139,44 @@ def breaks(*arguments, **settings):
     raise RuntimeError("solver broke")
 
 
-@pytest.mark.parametrize("solver", [answers_nonsense, gives_up, breaks])
-def test_boats_keep_apart_when_the_solver_fails(solver, monkeypatch):
-    monkeypatch.setattr(qpsolvers, "solve_qp", solver)
-    fleet = fleet_of([(0, 0, 0, 2), (0, 14, 180, 2)], [0, 0])
-    run = sail(Shield(), fleet, lambda step, state: np.array([[2.0, 0.0], [2.0, 0.0]]), 100)
-    assert distances(run.position)[:, 0, 1].min() >= 2.5
-    assert np.isfinite(run.sent).all()
+@pytest.mark.parametrize("solve_qp", [answers_nonsense, gives_up, breaks])
+def test_boats_keep_apart_when_the_solver_fails(solve_qp, backend):
+    asked = backend(solve_qp)
+    for seed in range(4):
+        run = six_near("daqp", seed)
+        assert run.closest(np.ones(6, bool)) >= 2.5
+        assert np.isfinite(run.sent).all()
+        assert not (run.solver == SOLVERS.index("qp")).any()
+    assert len(asked) > 5
 
 
-def herons(seed, side_m, gap_m, speed, turn_deg, steps):
-    """Six herons of ours with wants of their own, and how they sail."""
-    random = np.random.default_rng(seed)
-    state = scattered(random, 1, ["heron"] * 6, side_m, gap_m=gap_m, speed=(0.0, 1.0))[0]
-    wants = np.column_stack([random.uniform(*speed, 6), random.uniform(-turn_deg, turn_deg, 6)])
-    return wants, sail(Shield(), fleet_of(state[:, SEEN], [0] * 6), lambda _step, _state: wants, steps)
+def test_a_backend_decides_as_the_compiled_solver_does(backend):
+    asked, answered = backend(qpsolvers.solve_qp), 0
+    for seed in range(24):
+        run, compiled = six_near("daqp", seed), six_near("active_set", seed)
+        answered += (compiled.solver == SOLVERS.index("qp")).sum()
+        np.testing.assert_array_equal(run.reason, compiled.reason)
+        np.testing.assert_allclose(run.sent, compiled.sent, atol=1e-3)
+    assert len(asked) > 5
+    assert answered > 0
+
+
+def test_an_interrupt_while_a_backend_answers_ends_the_decision_and_is_over_then(backend):
+    def interrupted(*arguments, **settings):
+        raise KeyboardInterrupt
+
+    def sail_all(shield):
+        for seed in range(4):
+            herons(seed, 20.0, 3.0, (0.5, 2.0), 60.0, 60, shield)
+
+    answers = qpsolvers.solve_qp
+    backend(interrupted)
+    shield = Shield(solver="daqp")
+    with pytest.raises(KeyboardInterrupt):
+        sail_all(shield)
+    backend(answers)
+    for again in (shield, copy.deepcopy(shield), pickle.loads(pickle.dumps(shield))):
+        sail_all(again)
 
 
 def test_answers_are_sent_between_team_mates_and_none_comes_too_near():
