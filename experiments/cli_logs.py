@@ -265,7 +265,7 @@ def fit(
         "boat.yaml"
     ),
     name: Annotated[str | None, o.option("NAME", "Of the boat.", default="the file's name")] = None,
-    kind: Annotated[str, o.option("KIND", "rate, usv, or auto: the one that predicts best.")] = "auto",
+    kind: Annotated[str, o.option("KIND", "rate, usv, usv_by_speed, or auto: the one that predicts best.")] = "auto",
     boat: Annotated[str | None, o.option("NAME", "The boat, of a black-box log with several.")] = None,
     system_id: Annotated[int | None, o.option("N", "The boat, of a .tlog with several.")] = None,
     plot: Annotated[

@@ -44,6 +44,8 @@ _USV = (
 HELD_S, HELD_MPS, FASTER_MPS = 2.0, 0.06, 0.25
 """A boat at top speed holds it this long, s, within this range, m/s, though commanded this much faster, m/s."""
 
+FIRST_STEPS = 60  # from which the thrust at the beginning of a run is told
+
 SLOW_SHARE = 0.2  # share of top speed below which a boat counts as nearly at rest
 
 Bound = tuple[str, float, float, float]
@@ -108,8 +110,9 @@ def _slope(values: Array, over_s: float) -> Array:
 
 @dataclass(frozen=True)
 class Model:
-    """A kind of boat to fit; ``bounds`` give each parameter's name, first guess, lowest and highest value.
+    """A boat to fit; ``kind`` is its platform's.
 
+    ``bounds`` give each parameter's name, first guess, lowest and highest value.
     ``guesses`` are further first guesses for some parameters. ``build`` makes the platform from named values, its name
     and its top speed.
     """
@@ -169,7 +172,7 @@ def _rate(v: dict[str, float], name: str, top_mps: float) -> Platform:
     return Platform(name=name, kind="rate", max_speed_mps=top_mps, heading_pid=gains, **rest)
 
 
-def _usv(v: dict[str, float], name: str, top_mps: float) -> Platform:
+def _usv(v: dict[str, float], name: str, top_mps: float, full_turn_speed_mps: float = 0.0) -> Platform:
     return Platform(
         name=name,
         kind="usv",
@@ -177,11 +180,17 @@ def _usv(v: dict[str, float], name: str, top_mps: float) -> Platform:
         thrust_map=((-100.0, -top_mps), (0.0, 0.0), (50.0, v["half_speed"] * top_mps), (100.0, top_mps)),
         turn_loss=v["turn_loss"],
         turn_gain=v["turn_gain"],
+        full_turn_speed_mps=full_turn_speed_mps,
         max_acc=v["max_acc"],
         max_dec=v["max_dec"],
         speed_pid=Gains(kp=v["speed_kp"]),
         heading_pid=Gains(kp=v["kp"], kd=v["kd"]),
     )
+
+
+def _usv_by_speed(v: dict[str, float], name: str, top_mps: float) -> Platform:
+    """Build a boat that turns in proportion to speed; one with more turn gain from a higher speed on is the same."""
+    return _usv(v, name, top_mps, top_mps)
 
 
 RATE = Model(
@@ -202,7 +211,9 @@ USV = Model(
     ),
     _usv,
 )
-MODELS = {"rate": RATE, "usv": USV}
+USV_BY_SPEED = replace(USV, build=_usv_by_speed)
+MODELS = {"rate": RATE, "usv": USV, "usv_by_speed": USV_BY_SPEED}
+"""By name, for ``--kind``; `USV_BY_SPEED` is a usv that turns in proportion to its speed, too."""
 
 
 @kernel
@@ -236,6 +247,46 @@ def predict(params: Array, thrust: Array, seen: Array, commanded: Array, every: 
         step_boat(params, row, commanded[k, 0], _relative(row[L.HEADING], commanded[k, 1]), STEP_S)
 
 
+@kernel
+def _speed_missed(params: Array, thrust: float, seen: Array, commanded: Array) -> float:
+    """Return the sum of errors of the speed one step ahead, m/s, in the first steps of a run begun with a thrust."""
+    row, missed = np.zeros(L.N_STATE), 0.0
+    row[L.THRUST] = thrust
+    row[L.SPEED_ERROR] = row[L.HEADING_ERROR] = np.nan
+    for k in range(min(FIRST_STEPS, seen.shape[0] - 1)):
+        row[L.HEADING], row[L.SPEED] = _relative(0.0, seen[k, 2]), max(seen[k, 3], 0.0)
+        step_boat(params, row, commanded[k, 0], _relative(row[L.HEADING], commanded[k, 1]), STEP_S)
+        missed += abs(row[L.SPEED] - seen[k + 1, 3])
+    return missed
+
+
+@kernel
+def first_thrust(params: Array, seen: Array, commanded: Array) -> float:
+    """Return the thrust, percent, with which a run begins, by the speeds of its first steps.
+
+    A speed controller adds to its thrust, so one that is wrong stays so. A run may begin in a hard turn, at full thrust
+    and half speed.
+    """
+    best = thrust_at(params, max(0.0, seen[0, 3]))
+    if params[L.KIND] != L.KIND_USV or params[L.SPEED_FACTOR] != 0.0:
+        return best
+    least = _speed_missed(params, best, seen, commanded)
+    step = 0.125 * params[L.MAX_THRUST]
+    for k in range(9):
+        missed = _speed_missed(params, k * step, seen, commanded)
+        if missed < least:
+            best, least = k * step, missed
+    for _ in range(8):
+        step *= 0.5
+        for side in (-1.0, 1.0):
+            thrust = min(max(best + side * step, 0.0), params[L.MAX_THRUST])
+            missed = _speed_missed(params, thrust, seen, commanded)
+            if missed < least:
+                best, least = thrust, missed
+                break
+    return best
+
+
 def delayed(run: Run, delay_s: float) -> Array:
     """Return the commands in effect in each step after a delay; fractions of a step are interpolated."""
     steps = np.arange(len(run.commanded))
@@ -248,8 +299,9 @@ def errors_of(params: Array, run: Run, delay_s: float, every: int, ahead: int) -
     count = max(0, (len(run.seen) - 1 - ahead) // every + 1)
     out = np.zeros((count, ahead, 4))
     if count:
-        thrust = np.full(1, thrust_at(params, max(0.0, float(run.seen[0, 3]))))
-        predict(params, thrust, run.seen, delayed(run, delay_s), every, ahead, out)
+        commanded = delayed(run, delay_s)
+        thrust = np.full(1, first_thrust(params, run.seen, commanded))
+        predict(params, thrust, run.seen, commanded, every, ahead, out)
     for w in range(count):
         out[w] -= run.seen[w * every + 1 :][:ahead, :4]
     return out

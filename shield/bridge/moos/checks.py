@@ -247,7 +247,7 @@ def _hull_faults(mission: Mission, name: str, platform: Platform) -> Iterator[st
             yield (
                 f"{name} turns this boat by {theirs:.3g} deg/s at {speed_mps:g} m/s and thrust 50, platform "
                 f"{platform.name} by {ours:.3g}: give the platform turn_gain: {rate:g} and full_turn_speed_mps: "
-                f"{full_mps:g}, or fit it"
+                f"{full_mps:g}"
             )
             return
 

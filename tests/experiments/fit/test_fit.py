@@ -1,5 +1,6 @@
 """What is fitted foretells the boat, and its margin covers what it misses."""
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +8,10 @@ import pytest
 from steerclear.experiments import cli_logs
 from steerclear.experiments.cli import app
 from steerclear.experiments.fit.fitting import fit_runs, measured_of, platform_file
-from steerclear.experiments.fit.models import distance_m, errors_of
+from steerclear.experiments.fit.models import USV, USV_BY_SPEED, distance_m, errors_of
+from steerclear.experiments.fit.runs import Run
+from steerclear.shield.platforms import fresh_state, step_boat
+from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.files import parse_platform, to_text
 from typer.testing import CliRunner
 
@@ -71,3 +75,27 @@ def test_the_command_writes_file_and_picture_into_folders_that_it_makes(fitted):
     judged, folder = fitted
     assert parse_platform((folder / "a" / "boat.yaml").read_text()) == platform_file(judged, "boat")
     assert (folder / "b" / "boat.svg").read_text().startswith("<?xml")
+
+
+def sailed(params, thrust, speed):
+    """A run of 20 s of a boat that begins with a thrust and a speed in a turn."""
+    row, seen, commands = fresh_state(0.0, 0.0, 0.0, speed), [], []
+    row[L.THRUST] = thrust
+    for k in range(200):
+        commands.append((1.5, row[L.HEADING] + 80.0) if k < 100 else (1.0, commands[0][1]))
+        seen.append(row[[L.X, L.Y, L.HEADING, L.SPEED]])
+        step_boat(params, row, commands[-1][0], math.remainder(commands[-1][1] - row[L.HEADING], 360.0), 0.1)
+    return Run.of("run", 0.0, np.array(seen), np.array(commands))
+
+
+@pytest.mark.parametrize("thrust", [40.0, 100.0])
+def test_a_run_cut_out_of_a_turn_is_foretold_by_the_boat_that_sailed_it_and_by_no_other(thrust):
+    """It begins at half the speed of its thrust; a thrust taken for that speed's would stay wrong."""
+    values = {"half_speed": 0.55, "max_acc": 8.0, "max_dec": 0.5, "speed_kp": 1.0, "turn_loss": 0.85}
+    values |= {"turn_gain": 24.0, "kp": 0.9, "kd": 0.6, "delay_s": 0.0}
+    vector = np.array([values[name] for name, *_ in USV.bounds])
+    by_speed, at_any = (model.platform(vector, "boat", 2.0) for model in (USV_BY_SPEED, USV))
+    assert (by_speed.full_turn_speed_mps, at_any.full_turn_speed_mps) == (2.0, 0.0)
+    run = sailed(by_speed.pack(), thrust, 0.5)
+    assert distance_m(errors_of(by_speed.pack(), run, 0.0, 3, 30)).max() < 0.05
+    assert distance_m(errors_of(at_any.pack(), run, 0.0, 3, 30)).max() > 0.5

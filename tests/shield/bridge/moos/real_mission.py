@@ -230,7 +230,7 @@ def alone(command: str, folder: Path, platform: str | None = None) -> subprocess
 def fit(out: Path) -> str:
     """Write the platform that fits the simulator's boats, from a sea trial of 8 minutes; what was said of it."""
     with tempfile.TemporaryDirectory() as folder:
-        alone("sea-trial", Path(folder), "heron").check_returncode()
+        alone("sea-trial", Path(folder)).check_returncode()
         (log,) = Path(folder).glob("logs/*.mcap")
         return _steerclear("fit", str(log), "--boat", NAMES[0], "--out", str(out)).stdout
 
