@@ -76,7 +76,7 @@ MOST_BOATS = 1000
 MOST_LETTERS = 1000
 """Longest name, in characters."""
 
-_AGAIN = "Record the game again with GameRecorder and save() it."
+_AGAIN = "Record a game with `steerclear play --save game.npz`, or in Python with GameRecorder and save()."
 
 
 def read_meta(record: Mapping[str, np.ndarray]) -> dict[str, Any]:

@@ -87,7 +87,7 @@ def read_arrays(path: str | os.PathLike[str], what: str, remedy: str) -> dict[st
     if source.is_dir():
         raise TraceError(f"{source} is a folder; name a {what} in it (.npz)")
     if not source.is_file():
-        raise TraceError(f"there is no {what} {source}; check the path, or record a game first")
+        raise TraceError(f"there is no {what} {source}; check the path. {remedy}")
     if not zipfile.is_zipfile(source):  # numpy would take it for a pickle and advise to trust it
         raise TraceError(f"{source} is cut or not a {what}. {remedy}")
     try:

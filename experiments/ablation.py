@@ -20,14 +20,16 @@ from .metrics import RADII_M, check, game_goals, game_metrics_of, pairs_of, viol
 from .play.conditions import CALM, Conditions
 from .play.match import play_again, play_job
 from .play.spec import ANSWER_S, SIDES, MatchSpec
+from .policy_checks import made_of
 from .replay_html import write_replay
 from .report import write_report
 from .result_files import table_name
 from .runner import RESULTS_FILE, Experiment, Run
 from .statistics import DIFFERENCE, summarise
-from .tables import COVERED_HEAD, LEFT_HEAD
+from .tables import COVERED_HEAD, ITS_OWN, LEFT_HEAD
 from .verdicts import COVERED, OFF, ON, all_violations, state_of, summarise_verdicts
 from .warming import compile_game, compile_judge, compile_shield
+from .words import count_text
 from .workers import Row, Workers
 
 if TYPE_CHECKING:
@@ -128,7 +130,9 @@ class AblationSettings:
 
     def heads(self, pairing: str) -> dict[str, str]:
         """By state (off, on, difference) what a pairing's tables call it, where not as `tables.COLUMNS` does."""
-        return {"on": COVERED_HEAD if self.shield_autopilot else LEFT_HEAD} if any(self.states) else {}
+        made = made_of(self.own)
+        off = {OFF: ITS_OWN} if made is not None and made.shielded else {}
+        return off | ({ON: COVERED_HEAD if self.shield_autopilot else LEFT_HEAD} if any(self.states) else {})
 
     def experiment(self, command: str) -> Experiment:
         """What `runner.execute` runs."""
@@ -307,7 +311,7 @@ def failure_warnings(rows: Sequence[Row]) -> list[str]:
         if failed:
             count, text = sum(int(row[f"{column}policy_failures"]) for row in failed), _first_text(failed, begin)
             found.append(
-                f"The {words} failed {count:,} time{'s' if count > 1 else ''}, in {len(failed)} of {len(rows)} games; "
+                f"The {words} failed {count_text(count, 'time')}, in {len(failed)} of {count_text(len(rows), 'game')}; "
                 "boats without an action stopped for those steps, so the figures are not those of a working policy."
                 + (f" First failure: {text}" if text else "")
             )
@@ -322,8 +326,9 @@ def held_games(rows: Sequence[Row]) -> list[str]:
         if held:
             text = _first_text(held, begin)
             found.append(
-                f"the {words} gave no usable answer throughout {len(held)} of {len(rows)} games; its boats lay still, "
-                f"so these are figures of no policy{f' ({text})' if text else ''}; mend it or leave it out"
+                f"the {words} gave no usable answer throughout {len(held)} of {count_text(len(rows), 'game')}; its "
+                f"boats lay still, so these are figures of no policy{f' ({text})' if text else ''}; mend it or leave "
+                "it out"
             )
     return found
 

@@ -28,6 +28,7 @@ from .provenance import machine, versions
 from .replay_html import write_replay
 from .result_files import NEW, write_json
 from .runner import EXPERIMENT_FILE, Run, check_settings
+from .words import count_text
 from .workers import Workers
 
 app = App(
@@ -76,17 +77,19 @@ def check(
 def check_lines(found: dict[str, Any]) -> list[str]:
     """What a check found, in sentences."""
     imports, game, made = found["imports"], found["game"], found["made_for"]
+    made_in_game = ", ".join(count_text(game[f"{one}s"], one) for one in ("capture", "grab", "tag"))
     missing = f"; not installed here: {', '.join(imports['missing'])}" if imports["missing"] else ""
     missing += "; of these numba is only used where it is there" if made is not None else ""
     lines = [
         f"{headline(found)}.",
         f"imports beyond Python's own: {', '.join(imports['needed']) or 'nothing'}{missing}",
         f"time of a decision of the team: mean {time_text(found['mean_decision_ms'])}, longest "
-        f"{time_text(found['max_decision_ms'])} in {found['decisions']} decisions ({found['calls']} actions); "
+        f"{time_text(found['max_decision_ms'])} in {count_text(found['decisions'], 'decision')} "
+        f"({count_text(found['calls'], 'action')}); "
         f"{found['late_decisions']} took longer than the game gives ({found['decision_ms']:g} ms)",
         f"tried in {found['steps']} of the {found['game_steps']} decisions of a game",
-        f"against {game['duration_s']:g} s of boats that hold: {game['captures']} captures, {game['grabs']} grabs, "
-        f"{game['tags']} tags, {game['collisions']} collisions counted by the game",
+        f"in {game['duration_s']:g} s against boats that hold its boats made {made_in_game}; the game counted "
+        f"{count_text(game['collisions'], 'collision')} of its boats (one for each of them in it)",
     ]
     if made is not None:
         lines.insert(1, f"made by steerclear for preset {made['preset']}; {_kept(made['shield'])}")
@@ -157,7 +160,6 @@ def report(
     if many.quick:
         count = QUICK_GAMES if many.games is None else many.games
         settings = small_version(settings, QUICK_TIME_S if game.max_time is None else game.max_time, count)
-    warn(settings.how_many())
     results, run = run_games("entry report", settings, where, many.quick)
     results["warnings"] += why_none
     if not run.interrupted:

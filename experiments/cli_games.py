@@ -42,6 +42,7 @@ from .tables import (
     verdict_table,
 )
 from .verdicts import check_judge
+from .words import count_text
 
 FEW_GAMES = 20
 """Fewer of a pairing give intervals that say little."""
@@ -161,7 +162,7 @@ def _played(spec: MatchSpec) -> MatchResult:
 
 @command()
 def evaluate(
-    policy: Annotated[str, typer.Argument(help="A registered policy, or the folder or zip of a submission.")],
+    policy: Annotated[str, typer.Argument(help="A policy's name, or a submission's path.")],
     game: o.RuleOptions,
     shield_options: o.ShieldOptions,
     how: o.PlayOptions,
@@ -247,12 +248,12 @@ def run_games(
     check_judge(settings.judge)
     game, shielded = settings.specs()[0].config(), any(settings.states)
     check_shield(settings.shield, game)
+    shield, names = settings.shield if shielded else None, (settings.own, *settings.opponents)
+    check_run(names, game, shield, warn, settings.conditions, settings.trust)
     made = made_of(settings.own) if shielded else None
     if made is not None and made.shielded:  # games without ours are not games without a shield
         words = "has a shield in it: off means that one alone, on that one and ours; play the bare entry instead"
         warn(f"{settings.own} {words}")
-    shield, names = settings.shield if shielded else None, (settings.own, *settings.opponents)
-    check_run(names, game, shield, warn, settings.conditions, settings.trust)
     run = where.run(settings.experiment(name))
     replay = None
     if not run.interrupted:
@@ -306,14 +307,15 @@ def show(results: dict[str, Any], folder: Path) -> None:
     for one in results["failed"]:
         say(f"not played: {one['pairing']}, game {one['game']}, shield {one['state']}: {one['error']}")
     say(*(folder / name for name in results["files"].values()))
+    games = count_text(settings["games"], "game")
     if results["quick"]:
         out().print(
-            f"This was the small version: {settings['games']} games of {settings['rules']['max_time_s']:g} s per "
+            f"This was the small version: {games} of {settings['rules']['max_time_s']:g} s per "
             "pairing and state. Its intervals are wide; leave out --quick for games of full length, 20 and more."
         )
     elif settings["games"] < FEW_GAMES:
         out().print(
-            f"Intervals of {settings['games']} games per pairing say little: those of means are drawn from "
+            f"Intervals of {games} per pairing say little: those of means are drawn from "
             f"these games alone. Ask for {FEW_GAMES} and more."
         )
 

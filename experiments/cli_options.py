@@ -47,7 +47,7 @@ DrawSeed = Annotated[int, option("N", "Seed of what is drawn: the same one, the 
 Out = Annotated[Path | None, option("DIR", "Folder for results.", "--out", default="results/...")]
 Jobs = Annotated[int | None, option("N", "Processes.", default="all cores")]
 Resume = Annotated[bool, flag("Go on with what an interrupted run left in --out.", "--resume")]
-Quick = Annotated[bool, flag("The small version: fewer and shorter games.", "--quick")]
+Quick = Annotated[bool, flag("Fewer and shorter games.", "--quick")]
 MaxTime = Annotated[float | None, option("S", "Length of a game, s.", default="600")]
 Side = Annotated[str, option("COLOUR", "Colour of the own team: blue or red.")]
 Shielded = Annotated[bool, flag("Whether the own team is shielded.", "--shield/--no-shield")]

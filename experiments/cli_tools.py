@@ -7,6 +7,7 @@ import shlex
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, replace
+from itertools import takewhile
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -20,6 +21,7 @@ from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import kept_in
 from steerclear.shield.platforms import get_platform, known_platforms
 from steerclear.shield.platforms.files import PlatformFile, is_path, load_platform, to_text
+from steerclear.shield.platforms.registry import SHIPPED
 from steerclear.shield.platforms.schema import ENTRIES, GAINS, KIND_WORDS, MEASURED
 from steerclear.shield.renamed import current_keys
 from steerclear.shield.tables.files import read_table
@@ -36,11 +38,17 @@ from .provenance import head_of
 from .replay_html import check_endings, save_record, write_replay
 from .result_files import NEW, check_new, read_json, write_json, write_new
 from .runner import RESULTS_FILE
-from .tables import goals_table, interval_text, short_limit, titled
+from .tables import figures_table, goals_table, titled
 from .warming import PARTS
+from .words import count_text
 from .workers import end_failed, outcomes, processes_of
 
-CHANCE_WORDS = "Of figures that nothing changed one in twenty has an interval without 0: look at the few you asked for."
+CHANCE_WORDS = (
+    "A difference whose interval leaves out 0 is hardly chance. Of 20 figures that nothing changed, though, about one "
+    "has such an interval: choose which figures you ask about before you look."
+)
+DIFFERENCES = {"first": "A", "second": "B", "difference": "B - A, paired"}
+"""Columns of a comparison, by key."""
 DEVIATIONS = ("position_m", "heading_deg", "speed_mps", "observation_normalised")
 MISMATCHES_SHOWN = 5
 PLAIN_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,31}")
@@ -69,18 +77,16 @@ def compare(
 
 def _show_comparison(found: dict[str, Any]) -> None:
     for letter, run in (("A", found["first"]), ("B", found["second"])):
-        say(f"{letter}: {run['folder']}, {run['own']} {'with its' if run['shielded'] else 'without a'} shield")
+        say(f"{letter}: {run['folder']}: {run['own']}, shield {'on' if run['shielded'] else 'off'}")
     for name, (before, after) in found["differs"].items():
-        say(f"differs: {name}: {_told(before)} -> {_told(after)}")
+        say(f"differs: {name}: {_told(before)} in A, {_told(after)} in B")
     if not found["differs"]:
         say("No setting differs: these are the same games.")
     for pairing in found["pairings"]:
-        title = f"\nagainst {pairing['opponent']}: {pairing['pairs']} pairs, means per game [95 % interval]"
-        rows = [
-            [figures["label"], *(interval_text(figures[key], short_limit) for key in ("first", "second", "difference"))]
-            for figures in pairing["metrics"].values()
-        ]
-        out().print(titled(title, ["", "A", "B", "B - A, paired"], rows))
+        title = (
+            f"\nagainst {pairing['opponent']}: {count_text(pairing['pairs'], 'pair')}, means per game [95 % interval]"
+        )
+        out().print(figures_table(title, pairing["metrics"].values(), DIFFERENCES))
     say(f"\n{CHANCE_WORDS}")
     if min(pairing["pairs"] for pairing in found["pairings"]) < FEW_GAMES:
         say(f"Intervals of fewer than {FEW_GAMES} pairs say little.")
@@ -89,6 +95,8 @@ def _show_comparison(found: dict[str, Any]) -> None:
 def _told(value: Any) -> str:
     if isinstance(value, list):
         return ", ".join(str(one)[:12] or "none" for one in value) or "none"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
     return "default" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
 
 
@@ -201,7 +209,8 @@ def _show_parity(reports: Sequence[ParityReport], limits: dict[str, float]) -> N
             out().print(f"{stem}: step {one.step}, {one.event} of {one.who}: expected {one.expected}, got {one.got}")
     over = sum(not report.passed for report in reports)
     words = f"{over} of {len(reports)} over the limits" if over else "all within the limits"
-    out().print(f"{len(reports)} traces, {sum(report.steps for report in reports)} steps: {words}")
+    steps = count_text(sum(report.steps for report in reports), "step")
+    out().print(f"{count_text(len(reports), 'trace')}, {steps}: {words}")
 
 
 @command()
@@ -226,7 +235,7 @@ def bench(
 
         content = run_bench(settings.small() if quick else settings, notice)
     machine = content["machine"]
-    say(f"{machine['processor']}, {machine['cores']} cores, {machine['system']}", "")
+    say(f"{machine['processor']}, {count_text(machine['cores'], 'core')}, {machine['system']}", "")
     for table in bench_tables(content):
         out().print(titled(table.title, table.heads, table.rows, width=12 if len(table.heads) < 6 else 8))
         say("")
@@ -278,7 +287,17 @@ def show_platform(
     for key, entry in MEASURED.items():
         table.add_row(f"measured.{key}\n  {entry.unit}", "all", entry.words)
     out().print(table)
-    say(*(f"{kind}: {words}" for kind, words in KIND_WORDS.items()), f"boats: {', '.join(sorted(known_platforms()))}")
+    say(*(f"{kind}: {words}" for kind, words in KIND_WORDS.items()), "", "boats:")
+    say(*(f"{name}: {_origin(name)}" for name in sorted(known_platforms())))
+
+
+def _origin(name: str) -> str:
+    """What boat that is: the first sentence of its shipped file, of others what moves them."""
+    file = SHIPPED / f"{name}.yaml"
+    if not file.is_file():
+        return KIND_WORDS[get_platform(name).kind]
+    head = takewhile(lambda line: line.startswith("#"), file.read_text(encoding="utf-8").splitlines())
+    return " ".join(line.removeprefix("# ") for line in head).split(". ")[0].rstrip(".")
 
 
 @platforms_app.command("check")

@@ -164,7 +164,12 @@ def _flat(run: PlayedRun) -> dict[str, Any]:
     """What may differ between two runs, by name."""
     settings = {name: value for name, value in run.settings.items() if name not in (*SAME, *BESIDE)}
     shield, conditions = settings.pop("shield"), settings.pop("conditions")
-    found = {**settings, "shielded": run.shielded, **{f"conditions.{k}": v for k, v in conditions.items()}}
+    found = {
+        "policy": settings.pop("own"),
+        **settings,
+        "shielded": run.shielded,
+        **{f"conditions.{k}": v for k, v in conditions.items()},
+    }
     if run.shielded:
         found |= {f"shield.{name}": value for name, value in shield.items()}
     files = sorted(set(run.table["own_files"].fillna(""))) if len(run.table) else []

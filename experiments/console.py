@@ -32,7 +32,7 @@ MANY_OPTIONS = 13
 """A command with more options leaves those of `RARE` out of ``--help``, which then fits one screen."""
 
 RARE = {
-    *("--set", "--shield-set", "--profile", "--fixed-start", "--penalty", "--trust"),
+    *("--set", "--shield-set", "--fixed-start", "--penalty", "--trust"),
     *("--answer-time", "--delay", "--noise", "--current", "--judge", "--no-judge", "--no-shield-autopilot"),
     *("--engine", "--address", "--also", "--scene"),
     *("--restarts", "--population", "--generations", "--attackers", "--no-tlog", "--wait"),

@@ -148,7 +148,9 @@ COLUMNS: dict[str, Callable[[Cell], Any]] = {
     "unavoidable": lambda one: one["unavoidable"],
     "not judged": lambda one: one["not_judged"],
     "violated": lambda one: _count(one, "violated"),
-    "of those started outside": lambda one: _count(one, *reversed(OUTSIDE)) if one["started_outside"] else "",
+    "of those started outside the unavoidable set": lambda one: (
+        _count(one, *reversed(OUTSIDE)) if one["started_outside"] else ""
+    ),
     "commands changed": lambda one: f"{one['changed_percent']:.1f} %",
     "left alone": lambda one: _number(one["inactive_percent"]),
     "time to goal": lambda one: _number(one["goal_time_ratio"], ""),

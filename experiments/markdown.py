@@ -21,7 +21,7 @@ def line(content: object) -> str:
 
 def cell(content: object) -> str:
     """Text of a table's cell: as `line`, and no bar ends it. Code in backticks is for our own words."""
-    text = str(getattr(content, "text", content))
+    text = str(content)
     ours = text.startswith("`") and text.endswith("`") and text.count("`") == 2
     return (visible(text) if ours else line(text)).replace("|", "\\|")
 

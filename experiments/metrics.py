@@ -6,11 +6,12 @@ add one: a line in `OWN` here, whose ``measure`` tells it from a game's record.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from .statistics import Interval, count_interval, paired_ratio
+from .words import count_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -64,7 +65,7 @@ OWN: tuple[Metric, ...] = ()
 """Further figures of games: rows, tables, plots, comparisons and keys follow."""
 
 
-def game_metrics_of(radii_m: Sequence[float] = RADII_M) -> list[Metric]:
+def game_metrics_of(radii_m: Collection[float] = RADII_M) -> list[Metric]:
     """Every figure of games, in the order of the tables.
 
     Args:
@@ -119,11 +120,10 @@ def game_metrics_of(radii_m: Sequence[float] = RADII_M) -> list[Metric]:
 REASONS = {
     "least_change": "the command nearest to the nominal one that leaves every boat what its backup keeps, by quadratic "
     "program or line search",
-    "qp": "the least change of the quadratic program, as results of 0.8.0 and before name it",
+    "qp": "a least change by the quadratic program",
     "qp_relaxed": "the program's answer where not all could be kept, better than any backup",
-    "backup": "no small change was safe: the boat carries out the turn and straight run that it kept ready (in 0.8.0 "
-    "and before also a part of it)",
-    "escape": "the same, as results of 0.2.0 and before name it",
+    "backup": "no small change was safe: the boat carries out the turn and straight run that it kept ready",
+    "escape": "another name of backup",
     "best_effort": "no manoeuvre keeps the radius: the one that keeps most of it",
     "held": "the policy asked for nothing usable (no number, or absurdly large): the boat is told to stop on course",
     "right_of_way": "two teammates kept each other from turning: one gives way, one stands on",
@@ -207,7 +207,7 @@ def game_goals(separation_m: float) -> list[Goal]:
         def words(table: pd.DataFrame) -> str:
             pairs = pairs_of(table)
             sums = [f"{int(count(pairs, state).sum()):,} {state}" for state in ("off", "on")] if len(pairs) else []
-            return "; ".join(filter(None, (f"{', '.join(sums)} in {len(pairs)} games each", more(table))))
+            return "; ".join(filter(None, (f"{', '.join(sums)} in {count_text(len(pairs), 'game')} each", more(table))))
 
         return words
 

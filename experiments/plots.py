@@ -28,11 +28,17 @@ else:
 WIDTH_IN = 6.0
 COLOURS = {
     "off": "#94a3b8", "on": "#0b8a8f", "covered": "#3b6fd4", "ink": "#0f172a", "muted": "#546276", "line": "#d8dfe8",
-    "mark": "#be1893", "r1": "#e2a100", "r2": "#e2641e", "r4": "#6d5bd0", "r5": "#64748b",
+    "mark": "#be1893", "r1": "#e2a100", "r2": "#e2641e", "r4": "#6d5bd0", "r5": "#7a4a1e", "card": "#fefefe",
 }  # fmt: skip
 """By name of the variable in ``report.css`` (its light page's values)."""
-SERIES = ("on", "r1", "r2", "mark", "r4", "r5")
-"""Colours of parts and curves, in turn."""
+SERIES = tuple(
+    f"{colour} {pattern}".strip()
+    for pattern in ("", "striped", "dotted")
+    for colour in ("on", "r1", "r2", "mark", "r4", "r5")
+)
+"""Looks of parts and curves, in turn: a colour and, when all of these are used, a pattern; no two are alike."""
+PATTERNS = {"": ("", "-"), "striped": ("||||", "--"), "dotted": ("....", ":")}
+"""Hatch of an area and dash of a line, by pattern."""
 HUES = tuple(f"tab:{name}" for name in ("blue", "orange", "green", "red", "purple", "brown", "pink", "olive", "cyan"))
 """Colours of names in a scatter, in turn."""
 LABEL_LETTERS = 22
@@ -78,8 +84,8 @@ def label(words: str) -> str:
     return words if len(words) <= LABEL_LETTERS else "…" + words[1 - LABEL_LETTERS :]
 
 
-def bars(groups: Labelled, axis_words: str, reference: float | None = None) -> Figure:
-    """Draw groups of bars (a state is a colour's name) with their intervals, and a line at ``reference``."""
+def bars(groups: Labelled, axis_words: str) -> Figure:
+    """Draw groups of bars (a state is a colour's name) with their intervals."""
     lines = sum(len(group) for _, group in groups)
     canvas, axis = _canvas(0.7 + 0.21 * lines + 0.12 * len(groups))
     y, places = 0.0, []
@@ -89,8 +95,14 @@ def bars(groups: Labelled, axis_words: str, reference: float | None = None) -> F
             _bar(axis, y, COLOURS[state], figure)
             y += 1.0
         y += 0.6
-    _ended(axis, places, [label(name) for name, _ in groups], axis_words, reference)
+    _ended(axis, places, [label(name) for name, _ in groups], axis_words)
     return canvas
+
+
+def _look(look: str) -> tuple[str, str, str]:
+    """Colour, hatch and dash of one of `SERIES`."""
+    colour, _, pattern = look.partition(" ")
+    return COLOURS[colour], *PATTERNS[pattern]
 
 
 def _bar(axis: Any, y: float, colour: str, figure: Mapping[str, Any]) -> None:
@@ -147,16 +159,22 @@ def shares(groups: Sequence[tuple[str, Sequence[tuple[str, float]]]], axis_words
     canvas, axis = _canvas(0.7 + 0.34 * len(groups))
     for y, (_, parts) in enumerate(groups):
         left = 0.0
-        for k, (_, percent) in enumerate(parts):
-            axis.barh(y, percent, 0.6, left=left, color=COLOURS[SERIES[k % len(SERIES)]])
+        for look, (_, percent) in zip(SERIES, parts, strict=False):
+            colour, hatch, _ = _look(look)
+            axis.barh(y, percent, 0.6, left=left, color=colour, hatch=hatch, edgecolor=COLOURS["card"], lw=0.0)
             left += percent
         axis.annotate(f"{left:.2f} %", (left, y), (4, 0), textcoords="offset points", va="center", color=COLOURS["ink"])
-    _ended(axis, list(range(len(groups))), [label(name) for name, _ in groups], axis_words, None)
+    _ended(axis, list(range(len(groups))), [label(name) for name, _ in groups], axis_words)
     return canvas
 
 
 def _ended(
-    axis: Any, places: Sequence[float], names: Sequence[str], words: str, reference: float | None, turned: bool = True
+    axis: Any,
+    places: Sequence[float],
+    names: Sequence[str],
+    words: str,
+    reference: float | None = None,
+    turned: bool = True,
 ) -> None:
     axis.set_yticks(places, names)
     axis.tick_params(axis="y", length=0, labelcolor=COLOURS["ink"])
@@ -170,10 +188,11 @@ def _ended(
 
 
 def curves(series: Sequence[tuple[str, str, Sequence[float], Sequence[float]]], reference: float, words: str) -> Figure:
-    """Draw distributions, share of all below a value: name, colour's name, values, shares (0 to 1)."""
+    """Draw distributions, share of all below a value: name, look, values, shares (0 to 1)."""
     canvas, axis = _canvas(2.0, width_in=3.6)
-    for _, colour, x, y in series:
-        axis.plot(x, y, color=COLOURS[colour], lw=1.5)
+    for _, look, x, y in series:
+        colour, _, dash = _look(look)
+        axis.plot(x, y, color=colour, ls=dash, lw=1.5)
     axis.axvline(reference, color=COLOURS["mark"], ls="--", lw=1.1)
     axis.grid(color=COLOURS["line"], lw=0.6)
     axis.set_xlabel(words, color=COLOURS["muted"])

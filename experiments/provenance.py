@@ -20,7 +20,7 @@ NO_GAME = (
     "env/render/",
     "experiments/sim_boats/",
     *(f"experiments/{name}.py" for name in ("docs", "markdown", "page", "plots")),
-    *(f"experiments/{name}.py" for name in ("report", "replay_html", "tables", "terminal")),
+    *(f"experiments/{name}.py" for name in ("report", "replay_html", "tables", "terminal", "words")),
     *(f"experiments/{name}" for name in ("cli", "console")),
 )
 """How the names of files begin whose code changes no result that is kept on disk."""

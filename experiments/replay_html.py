@@ -195,9 +195,9 @@ def own_team(metas: Sequence[Mapping[str, Any]]) -> int:
 
 
 def game_title(meta: Mapping[str, Any]) -> str:
-    """Return the game's own title or who plays whom, and whether a shield is on."""
+    """Return the game's own title, or who plays whom and whether a shield is on."""
     blue, red = (meta["policies"].get(side) or side for side in ("blue", "red"))
-    return f"{meta.get('title') or f'{blue} – {red}'}, {'shield on' if meta['shielded'] else 'shield off'}"
+    return meta.get("title") or f"{blue} – {red}, {'shield on' if meta['shielded'] else 'shield off'}"
 
 
 ENDINGS = (".npz", ".html", ".mp4", ".gif", ".png")

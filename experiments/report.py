@@ -18,8 +18,11 @@ from .play.conditions import words_of
 from .tables import (
     COVERED_HEAD,
     COVERED_WORDS,
+    ITS_OWN,
     LEFT_HEAD,
+    OWN_SHIELDS,
     columns_of,
+    figure_rows,
     goal_cells,
     interval_text,
     limits_text,
@@ -27,33 +30,28 @@ from .tables import (
     verdict_of,
 )
 from .tables import Table as Table
-from .verdicts import COVERED, HEADS, OFF, ON, state_of, verdict_rows
+from .verdicts import COVERED, HEADS, OFF, ON, STATES, state_of, verdict_rows
+from .words import count_text, seeds_text
 
 Summary = Mapping[str, Any]
-SHIELDS = ((OFF, "shield off"), (ON, "shield on"), (COVERED, f"shield {COVERED_HEAD}"))
-MOST_ROWS, MOST_VIOLATIONS = 600, 200
-CHANGED_SHARE_GOAL = 5.0
+SHIELDS = {OFF: "off", ON: "on", COVERED: COVERED_HEAD}
+OWN_COLOUR = "r4"
+"""Of games without a shield round them whose boats have one in their entry: neither off nor on."""
+MOST_ROWS, MOST_VIOLATIONS, MOST_BESIDE = 600, 200, 3
+"""Rows of a table of games, of one of hits, and columns of figures of two tables side by side."""
 STYLES = {"green": "good", "red": "bad", "yellow": "muted"}
 NOTE = (
-    "Whiskers and brackets are 95 % intervals. A hit is one entry of two boats into the radius, however long it lasts. "
-    "The dashed line marks the separation radius, and in the plot of steps changed the goal of 5 %."
+    "Whiskers and brackets are 95 % intervals. A hit is one entry of two boats into the radius, however long it lasts."
 )
 HINDSIGHT = (
     "With every other boat's actual track, could own commands of the last 30 s have kept the radius? 'Last moment' is "
     "how long before the hit that was still so; who let the later of both boats' last moments pass is responsible."
 )
 OF_AN_ENTRY = (
-    "Shield on is the shield round the game, ten times a second; headlines compare it with the entry alone. "
-    "Pairings of the zip are played with the shield in it, and drawn in the colour of shield off."
+    "The shield round the game decides ten times a second; headlines compare it with the entry alone. The shield in "
+    "the zip is what is handed in; its games are pairings of their own."
 )
 IMAGES = "; img-src data:"
-
-
-class Cell(NamedTuple):
-    """A table's cell with words below it."""
-
-    text: str
-    note: str
 
 
 class Tile(NamedTuple):
@@ -66,7 +64,7 @@ class Tile(NamedTuple):
 
 
 class Plot(NamedTuple):
-    """A plot of the page, with the names of its colours, and the meanings of words in it."""
+    """A plot of the page, with its legend (looks as of `plots.SERIES`, and names), and the meanings of words in it."""
 
     title: str
     svg: Markup
@@ -192,8 +190,9 @@ def game_report(results: Mapping[str, Any]) -> Report:
         settings.get("separation_m") or (settings.get("shield") or {}).get("separation_m") or RADII_M[0]
     )
     violations, games = results.get("violations") or (), results.get("games") or ()
+    beside = all(len(columns_of(pairing)) <= MOST_BESIDE for pairing in pairings)
     return Report(
-        title=results.get("title") or _played(settings)[0],
+        title=results.get("title") or _played(results)[0],
         subtitle=_subtitle(results, separation_m),
         warnings=results.get("warnings") or (),
         tiles=_tiles(pairings, separation_m),
@@ -202,14 +201,26 @@ def game_report(results: Mapping[str, Any]) -> Report:
         plots=_plots(pairings, games, separation_m) if games else (),
         notes=[NOTE, *([OF_AN_ENTRY] if settings.get("zip_file") else [])],
         sections=[
-            Section("Pairings", [*map(_pairing_table, pairings)], COVERED_WORDS if settings.get("covered") else ""),
+            Section(
+                "Pairings",
+                [*map(_pairing_table, pairings), _meanings_table(pairings, separation_m)],
+                COVERED_WORDS if settings.get("covered") else "",
+                wide=not beside,
+            ),
             Section(
                 "Hits judged in hindsight",
-                [*map(_verdict_table, pairings), *([_violations_table(violations)] if violations else [])],
+                [*map(_verdict_table, pairings)],
                 HINDSIGHT,
             ),
             made_of(results, results.get("failed") or []),
-            Section("", [_rows_table("Every game", games, folded=True)], wide=True),
+            Section(
+                "",
+                [
+                    *([_violations_table(violations)] if violations else []),
+                    _rows_table("Every game", games, folded=True),
+                ],
+                wide=True,
+            ),
         ],
     )
 
@@ -221,23 +232,25 @@ def _subtitle(results: Mapping[str, Any], separation_m: float) -> str:
     parts = [
         settings.get("preset"),
         f"{own} against {against}" if own and against else own,
-        f"{count} game{'' if count == 1 else 's'}, {_played(settings)[1]}",
+        f"{count_text(count, 'game')}, {_played(results)[1]}",
         f"separation {separation_m:g} m",
         words_of(settings.get("conditions") or {}),
-        f"seeds {seeds[0]} to {seeds[-1]}" if seeds else "",
+        seeds_text(seeds[0], seeds[-1]) if seeds else "",
         f"steerclear {version}" if version else "",
         "small version (--quick): its intervals are wide" if results.get("quick") else "",
     ]
     return " · ".join(str(part) for part in parts if part)
 
 
-def _played(settings: Mapping[str, Any]) -> tuple[str, str]:
+def _played(results: Mapping[str, Any]) -> tuple[str, str]:
     """Title, and words for the states of the shield that the games were played in."""
-    states = set(settings.get("states") or (False, True))
+    states = set(results["settings"].get("states") or (False, True))
+    own = any(_head(pairing, OFF) == ITS_OWN for pairing in results["pairings"])
     if len(states) > 1:
-        return "What the shield changes", "each start played without and with the shield"
-    how = "with" if True in states else "without"
-    return f"Games {how} the shield", f"played {how} the shield"
+        how = "with its own shield and with ours round it" if own else "without and with the shield"
+        return "What the shield changes", f"each start played {how}"
+    how = "with the shield" if True in states else "with its own shield" if own else "without the shield"
+    return f"Games {how}", f"played {how}"
 
 
 def _tiles(pairings: Sequence[Summary], separation_m: float) -> list[Tile]:
@@ -273,37 +286,61 @@ def _plots(pairings: Sequence[Summary], games: Sequence[Mapping[str, Any]], sepa
             for kind in ("opponent", "teammate")
         ),
         _bars("Captures", pairings, "captures", "captures per game"),
-        _closest(games, separation_m),
-        _bars("Steps changed", pairings, "changed_share", "steps changed, %", CHANGED_SHARE_GOAL),
+        _closest(pairings, games, separation_m),
+        _bars("Steps changed", pairings, "changed_share", "steps changed, %"),
         _reasons(pairings),
     ]
 
 
-def _bars(title: str, pairings: Sequence[Summary], key: str, words: str, reference: float | None = None) -> Plot:
-    found = [(pairing["pairing"], pairing["metrics"][key]) for pairing in pairings]
-    groups = [(name, [(state, figures[state]) for state, _ in SHIELDS if state in figures]) for name, figures in found]
-    figure = plots.bars([group for group in groups if group[1]], words, reference)
-    legend = _legend(groups) if any(len(group) > 1 for _, group in groups) else ()
-    return Plot(title, Markup(plots.svg(figure, words)), legend)
+def _bars(title: str, pairings: Sequence[Summary], key: str, words: str) -> Plot:
+    groups = _coloured(pairings, [one["metrics"][key] for one in pairings])
+    legend = _legend(pairings, groups) if any(len(group) > 1 for _, group in groups) else ()
+    return Plot(title, Markup(plots.svg(plots.bars(groups, words), words)), legend)
 
 
-def _legend(groups: Sequence[tuple[str, Sequence[tuple[str, Any]]]]) -> list[tuple[str, str]]:
-    """Colours of the states that are drawn."""
-    drawn = {state for _, group in groups for state, _ in group}
-    words = dict(SHIELDS) | ({ON: f"shield {LEFT_HEAD}"} if COVERED in drawn else {})
-    return [(state, words[state]) for state in words if state in drawn]
-
-
-def _closest(games: Sequence[Mapping[str, Any]], separation_m: float) -> Plot:
-    words = "closest distance in each game, m"
-    found: dict[str, dict[str, list[float]]] = {}
+def _closest(pairings: Sequence[Summary], games: Sequence[Mapping[str, Any]], separation_m: float) -> Plot:
+    words = f"closest distance in each game, m; dashed: the separation, {separation_m:g} m"
+    found: dict[str, dict[str, list[float]]] = {one["pairing"]: {} for one in pairings}
     for row in games:
         if row["closest_m"] is not None and row["closest_m"] == row["closest_m"]:
-            states = found.setdefault(row["pairing"], {state: [] for state, _ in SHIELDS})
-            states[state_of(row)].append(float(row["closest_m"]))
-    groups = [(name, [(state, values) for state, values in states.items() if values]) for name, states in found.items()]
+            found[row["pairing"]].setdefault(state_of(row), []).append(float(row["closest_m"]))
+    groups = _coloured(pairings, list(found.values()))
     figure = plots.dots(groups, words, separation_m)
-    return Plot("Closest distance", Markup(plots.svg(figure, words)), _legend(groups))
+    return Plot("Closest distance", Markup(plots.svg(figure, words)), _legend(pairings, groups))
+
+
+def _coloured(pairings: Sequence[Summary], values: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[Any]]]:
+    """Per pairing that has any its name and, state by state, the colour and what there is by the state."""
+    groups = [
+        (one["pairing"], [(_colour(one, state), found[state]) for state in STATES if state in found])
+        for one, found in zip(pairings, values, strict=True)
+    ]
+    return [group for group in groups if group[1]]
+
+
+def _head(pairing: Summary, state: str) -> str:
+    """What tables call a state of a pairing."""
+    return str((pairing.get("heads") or {}).get(state, SHIELDS[state]))
+
+
+def _words(pairing: Summary, state: str) -> str:
+    """The same where no head of a column stands above it."""
+    head = _head(pairing, state)
+    return f"shield {head}" if head in (*SHIELDS.values(), LEFT_HEAD) else head
+
+
+def _colour(pairing: Summary, state: str) -> str:
+    return OWN_COLOUR if state == OFF and _head(pairing, state) in OWN_SHIELDS else state
+
+
+def _legend(
+    pairings: Sequence[Summary], groups: Sequence[tuple[str, Sequence[tuple[str, Any]]]]
+) -> list[tuple[str, str]]:
+    """What the colours that are drawn stand for."""
+    drawn = {colour for _, group in groups for colour, _ in group}
+    played = [(one, state) for state in STATES for one in pairings if one.get(f"games_{state}")]
+    words = {_colour(one, state): _words(one, state) for one, state in played}
+    return [(colour, words[colour]) for colour in words if colour in drawn]
 
 
 def _reasons(pairings: Sequence[Summary]) -> Plot:
@@ -316,25 +353,36 @@ def _reasons(pairings: Sequence[Summary]) -> Plot:
         if (total := sum(p["reasons"].values()))
     ]
     words = "commands the shield changed, % of all it decided"
-    shown = {name: name.replace("_", " ").lower().replace("qp", "QP") for name in names}
-    legend = [(plots.SERIES[k % len(plots.SERIES)], shown[name]) for k, name in enumerate(names)]
-    meanings = [(shown[name], REASONS[name.lower()]) for name in names if name.lower() in REASONS]
+    legend = [(look, reason_words(name)) for look, name in zip(plots.SERIES, names, strict=False)]
+    meanings = [(reason_words(name), REASONS[name.lower()]) for name in names if name.lower() in REASONS]
     return Plot("Why commands were changed", Markup(plots.svg(plots.shares(groups, words), words)), legend, meanings)
 
 
+def reason_words(name: str) -> str:
+    """The name of a reason as it is read."""
+    return name.replace("_", " ").lower().replace("qp", "QP")
+
+
 def _pairing_table(pairing: Summary) -> Table:
-    meanings = {metric.key: metric.meaning for metric in game_metrics_of()}
-    columns, covered = columns_of(pairing), pairing.get("games_covered")
-    note = f"{pairing['games_off']} games without, {pairing['games_on']} with the shield; per game [95 % interval]"
-    note += f"; {covered} games covered" if covered else ""
+    columns = columns_of(pairing)
+    named = {state: count_text(count, "game") for state in STATES if (count := pairing.get(f"games_{state}"))}
+    note = "; ".join(f"{_words(pairing, state)}: {count}" for state, count in named.items())
+    note += "; per game [95 % interval]"
     if total := sum(pairing["reasons"].values()):
-        parts = [f"{name} {100 * count / total:.2f} %" for name, count in pairing["reasons"].items() if count]
+        parts = [
+            f"{reason_words(name)} {100 * count / total:.2f} %" for name, count in pairing["reasons"].items() if count
+        ]
         note += f". Decisions: {', '.join(parts)} of {total:,} boat-steps"
-    rows = [
-        [Cell(figures.get("label", key), meanings.get(key, "")), *(interval_text(figures.get(c)) for c in columns)]
-        for key, figures in pairing["metrics"].items()
-    ]
+    rows = figure_rows(pairing["metrics"].values(), columns)
     return Table(pairing["pairing"], ["", *columns.values()], rows, f"{note}.")
+
+
+def _meanings_table(pairings: Sequence[Summary], separation_m: float) -> Table:
+    """What each figure of the pairings is, once for all."""
+    labels = {key: figures["label"] for one in pairings for key, figures in one["metrics"].items()}
+    meanings = {metric.key: metric.meaning for metric in game_metrics_of({*RADII_M, separation_m})}
+    rows = [[label, meanings[key]] for key, label in labels.items() if key in meanings]
+    return Table("What the figures are", [], rows, folded=True, numbers=False)
 
 
 def _verdict_table(pairing: Summary) -> Table:

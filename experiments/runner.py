@@ -61,7 +61,10 @@ class Interrupted(Exception):
 
 @dataclass(frozen=True)
 class Experiment:
-    """What is run: jobs (what ``unit`` calls them) by ``run``; ``warm_up`` compiles before many processes start."""
+    """What is run: jobs (what ``unit`` calls them) by ``run``; ``warm_up`` compiles before many processes start.
+
+    ``about`` is told before the first job, once nothing refuses them.
+    """
 
     command: str
     settings: Mapping[str, Any]
@@ -69,6 +72,7 @@ class Experiment:
     run: Callable[[Job], list[Row]]
     unit: str = "games"
     warm_up: Sequence[Callable[[], object]] = ()
+    about: str = ""
 
 
 @dataclass
@@ -160,7 +164,7 @@ def execute(
         workers: processes on this machine (1: this one), or a Ray cluster.
         resume: go on with what is there instead of refusing.
         notice: told how many jobs are done, first of those found there.
-        tell: told in words, once, what is gone on with.
+        tell: told in words, once each, what the experiment is about and what is gone on with.
 
     Raises:
         ConfigError: the folder holds results and ``resume`` is off, or another experiment's, or results of other
@@ -173,6 +177,8 @@ def execute(
     if there - set(ids) or (not there and (folder / RESULTS_FILE).exists()):
         check_settings(folder, experiment.settings)
     kept = {name: before[name] for name in ids if name in before}
+    if experiment.about:
+        tell(experiment.about)
     if resume:
         words = f"{len(kept)} of {len(ids)} {experiment.unit} are in {folder / ROWS_FILE} and are taken from there"
         if others := len(before) - len(kept):

@@ -14,6 +14,7 @@ from rich.text import Text
 
 from .metrics import game_metrics_of
 from .verdicts import SHORT_HEADS, verdict_rows
+from .words import count_text
 
 Figure = Mapping[str, float | None]
 COLUMNS = {
@@ -25,6 +26,8 @@ COLUMNS = {
 }
 """What is shown of a pairing's figures, where there is any, and its head."""
 LEFT_HEAD, COVERED_HEAD = "on, left to the game", "on, covered"
+IN_ZIP, ITS_OWN = OWN_SHIELDS = "shield in the zip", "its own shield"
+"""Heads of games without a shield round them whose boats have one all the same, in their entry."""
 STATE_WORDS = (
     "Left to the game: boats that the game drives (tagged, out of bounds) are not shielded, as in a real game and a "
     "wrapped zip; covered: they are."
@@ -57,8 +60,8 @@ def columns_of(summary: Mapping[str, Any]) -> dict[str, str]:
 
 def pairing_table(summary: Mapping[str, Any]) -> Group:
     """Each figure of a pairing without and with the shield, and the paired difference."""
-    games = max(summary["games_off"], summary["games_on"])
-    title = f"{summary['pairing']}: {games} game{'s' if games != 1 else ''}, means per game [95 % interval]"
+    games = count_text(max(summary["games_off"], summary["games_on"]), "game")
+    title = f"{summary['pairing']}: {games}, means per game [95 % interval]"
     shown = {key: head for key, head in columns_of(summary).items() if "covered" not in key}
     return figures_table(title, summary["metrics"].values(), shown)
 
@@ -74,8 +77,15 @@ def covered_table(summary: Mapping[str, Any]) -> Group | None:
 
 def figures_table(title: str, metrics: Iterable[Mapping[str, Any]], columns: Mapping[str, str]) -> Group:
     """A line per metric: its label and its figures, by key of ``columns``."""
-    rows = [[one["label"], *(interval_text(one.get(key), short_limit) for key in columns)] for one in metrics]
-    return titled(title, ["", *columns.values()], rows)
+    return titled(title, ["", *columns.values()], figure_rows(metrics, columns, short_limit))
+
+
+def figure_rows(
+    metrics: Iterable[Mapping[str, Any]], columns: Iterable[str], limit_text: Callable[[float], str] | None = None
+) -> list[list[str]]:
+    """Rows of labels and figures; what no column has a figure of is left out."""
+    rows = [[one["label"], *(interval_text(one.get(key), limit_text) for key in columns)] for one in metrics]
+    return [row for row in rows if any(text != "-" for text in row[1:])]
 
 
 def verdict_table(summary: Mapping[str, Any]) -> Group | None:
@@ -182,9 +192,9 @@ def interval_text(figure: Figure | None, limit_text: Callable[[float], str] | No
 
 
 def limits_text(figure: Figure, limit_text: Callable[[float], str] | None = None) -> str:
-    """Write `` [low, high]``, nothing where there are no limits."""
+    """Write `` [low, high]``, nothing where there is no value or there are no limits."""
     limits = [figure["low"], figure["high"]]
-    if any(limit is None or limit != limit for limit in limits):
+    if any(number is None or number != number for number in (figure["value"], *limits)):
         return ""
     return f" [{', '.join((limit_text or number_text)(float(limit)) for limit in limits if limit is not None)}]"
 

@@ -26,6 +26,7 @@ from .report import Plot, Report, Section, made_of
 from .result_files import table_name
 from .runner import RESULTS_FILE, Experiment, Run
 from .warming import compile_game, compile_judge, compile_shield
+from .words import count_text, seeds_text
 from .workers import Job, Row, Workers
 
 if TYPE_CHECKING:
@@ -215,12 +216,15 @@ def warnings_of(table: pd.DataFrame) -> list[str]:
     for team, own in table.groupby("team", sort=False) if len(table) else ():
         failed = own[own["failures"] > 0]
         if len(failed):
+            times, games = count_text(int(failed["failures"].sum()), "time"), count_text(len(own), "game")
             found.append(
-                f"{team} failed {failed['failures'].sum():,} times, in {len(failed)} of {len(own)} games; its boats "
-                f"held for those moves. First: {failed['first_failure'].iloc[0]}"
+                f"{team} failed {times}, in {len(failed)} of {games}; its boats held for those moves. First: "
+                f"{failed['first_failure'].iloc[0]}"
             )
         if missed := int(own["missed_deadlines"].sum()):
-            found.append(f"{team} missed {missed:,} deadlines; its games may come out otherwise on another machine.")
+            found.append(
+                f"{team} missed {count_text(missed, 'deadline')}; its games may come out otherwise on another machine."
+            )
     return found
 
 
@@ -247,14 +251,15 @@ def subtitle(results: Results) -> str:
     settings = results["settings"]
     length, repetitions = (settings["rules"] or {}).get("max_time_s"), settings["repetitions"]
     there = (
-        f"{shown(state['state'])} {state['games']} games, repetitions of every pair that met: {state['repetitions']}"
+        f"{shown(state['state'])} {count_text(state['games'], 'game')}, repetitions of every pair that met: "
+        f"{state['repetitions']}"
         for state in results["states"]
     )
     return (
-        f"{settings['preset']}, {results['games_played']} games"
+        f"{settings['preset']}, {count_text(results['games_played'], 'game')}"
         + (f" of {length:g} s" if length else "")
-        + f", {repetitions} repetition{'' if repetitions == 1 else 's'} of every pair on both sides in every state, "
-        + f"seeds {settings['seed']} to {settings['seed'] + repetitions - 1}, penalty {settings['penalty']:g}, "
+        + f", {count_text(repetitions, 'repetition')} of every pair on both sides in every state, "
+        + f"{seeds_text(settings['seed'], settings['seed'] + repetitions - 1)}, penalty {settings['penalty']:g}, "
         + f"steerclear {results['versions']['steerclear']}"
         + ("" if results["complete"] else f"; not complete: {'; '.join(there)}")
     )

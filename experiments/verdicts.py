@@ -156,7 +156,16 @@ OFF, ON, COVERED = STATES = ("off", "on", "covered")
 """States of the shield; covered, where it is played beside on: also for boats that the game drives."""
 _COUNTED = (*(outcome.value for outcome in Outcome), NOT_JUDGED)
 HEADS = (
-    *("", "hits", "game-controlled", "avoidable", "unavoidable", "started inside", "not judged", "avoidable per game"),
+    *(
+        "",
+        "hits",
+        "game-controlled",
+        "avoidable",
+        "unavoidable",
+        "started inside the radius",
+        "not judged",
+        "avoidable per game",
+    ),
 )
 SHORT_HEADS = ("", "hits", "game-controlled", "avoid.", "unavoid.", "inside", "unjudged", "avoidable/game")
 """Heads of the terminal's table; game-controlled hits are those, of all, whose own boats the game drove."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import logging
 import multiprocessing
 import multiprocessing.connection
 import os
@@ -17,12 +18,15 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache, lru_cache, partial
 from importlib.util import find_spec
+from multiprocessing.context import SpawnContext
+from multiprocessing.synchronize import Semaphore
 from typing import Any, NoReturn
 
 from steerclear.shield.exceptions import ConfigError, SteerclearError
 from steerclear.shield.extras import install_command
+from steerclear.shield.jit import LOG
 
 from .provenance import available_cores, code_digest, package_version
 
@@ -53,6 +57,8 @@ MACHINE = {
 """What a machine may refuse, with what helps."""
 _INTERRUPTED = threading.Event()
 """Set once a signal asks for the end: compiled code and callbacks may lose the KeyboardInterrupt that it raises."""
+COMPILES = "compiles its machine code"
+"""In what the compiler says of itself; of all processes one says it, and one is enough."""
 _ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
 
 
@@ -249,7 +255,7 @@ def _pool(processes: int) -> Iterator[ProcessPoolExecutor]:
     others = set(multiprocessing.active_children())
     unset = [name for name in _ONE_THREAD if name not in os.environ]
     os.environ.update({name: _ONE_THREAD[name] for name in unset})
-    pool = ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), _begin_worker)
+    pool = ProcessPoolExecutor(processes, _spawning(), _begin_worker, (_first_word(),))
     try:
         yield pool
         pool.shutdown(wait=True)
@@ -264,7 +270,25 @@ def _pool(processes: int) -> Iterator[ProcessPoolExecutor]:
             del os.environ[name]
 
 
-def _begin_worker() -> None:
+@cache
+def _spawning() -> SpawnContext:
+    return multiprocessing.get_context("spawn")
+
+
+@cache
+def _first_word() -> Semaphore:
+    """Who gets it of all processes may say that machine code is compiled; this one, where it has to before others."""
+    first = _spawning().Semaphore(1)
+    LOG.addFilter(partial(_may_say, first))
+    return first
+
+
+def _may_say(first: Semaphore, record: logging.LogRecord) -> bool:
+    return COMPILES not in record.getMessage() or first.acquire(block=False)
+
+
+def _begin_worker(first: Semaphore) -> None:
+    LOG.addFilter(partial(_may_say, first))
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; only the parent answers
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     if (parent := multiprocessing.parent_process()) is not None:

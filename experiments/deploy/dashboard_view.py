@@ -22,6 +22,7 @@ from steerclear.shield.bridge.messages import BoatReading, Contact, Tick
 from steerclear.shield.decision import Decision, Reason
 from steerclear.shield.fleet import Fleet
 
+from ..words import count_text
 from .dashboard_map import COLOURS, SYMBOLS, FieldMap
 from .plain import LINES
 
@@ -49,7 +50,7 @@ DROPPED = ("constraint", "hdg", "m/s", "age", "closest", "why", "margin")
 WHY = {
     Reason.PASSED: ("passed", "green", "the nominal command leaves the boat a way out: sent as it is"),
     Reason.LEAST_CHANGE: ("least", "cyan", "changed as little as it takes to keep clear of everything"),
-    Reason.QP_RELAXED: ("QP slack", "yellow", "of logs of 0.2.0 and before"),
+    Reason.QP_RELAXED: ("QP slack", "yellow", "the nearest command where not everything could be kept clear of"),
     Reason.BACKUP: ("backup", "yellow", "its backup manoeuvre, which keeps clear of all boats"),
     Reason.BEST_EFFORT: (
         "best eff.",
@@ -198,7 +199,7 @@ class Moment:
         if self.tick.fleet is None:
             return "unknown", ()
         count = len(self.tick.actions)
-        return ("effect", (f"{count} response{'s' if count > 1 else ''}",)) if count else ("fine", ())
+        return ("effect", (count_text(count, "response"),)) if count else ("fine", ())
 
 
 class View:

@@ -18,6 +18,7 @@ from steerclear.shield.bridge.blackbox.header import describe_machine, source_di
 
 from ..game_metrics import PairDistances
 from ..verdicts import judge_game
+from ..words import count_text
 from .proof import Difference, Proof, Prover
 from .tracks import TrackBuilder, Tracks, placed, record_of
 
@@ -168,7 +169,7 @@ def _log_lines(replay: Replay) -> Iterator[RenderableType]:
     header = replay.header
     ours = [boat.name for boat in header.boats if boat.ours]
     whose = f", policy {header.policy}" * bool(header.policy) + f", own boats {', '.join(ours)}" * bool(ours)
-    yield Text(f"{replay.began}, {replay.seconds:.1f} s, {replay.proof.ticks} turns{whose}")
+    yield Text(f"{replay.began}, {replay.seconds:.1f} s, {count_text(replay.proof.ticks, 'turn')}{whose}")
     if replay.origin:
         yield Text(
             f"Made by {replay.made_by}. Not all is as here, and this program may decide otherwise:", style="yellow"
@@ -201,25 +202,31 @@ def _proof_lines(replay: Replay) -> Iterator[RenderableType]:
     if proof.decisions == 0:
         yield Text("The log holds no decision of the shield: nothing is proved.", style="yellow")
     elif proof.different == 0 and proof.unproven == 0:
-        yield Text(f"{proof.same} of {proof.decisions} decisions made again, the same bit for bit.", style="green")
+        yield Text(
+            f"{proof.same} of {count_text(proof.decisions, 'decision')} made again, the same bit for bit.",
+            style="green",
+        )
     else:
         yield Text(
-            f"{proof.same} of {proof.decisions} decisions are the same, {proof.different} differ, {proof.unproven} "
-            f"differ after turns missing from the log and are not proved ({len(proof.missing)} gaps).",
+            f"{proof.same} of {count_text(proof.decisions, 'decision')} made again the same, {proof.different} differ, "
+            f"{proof.unproven} differ after turns missing from the log and are not proved "
+            f"({count_text(len(proof.missing), 'gap')}).",
             style="red" if proof.different else "yellow",
         )
     if proof.missing:
         lost = sum(after - before - 1 for before, after in proof.missing if after > before)
         back = sum(after <= before for before, after in proof.missing)
-        text = f"{lost} turns are missing from the log" + (f", {back} times they go back" if back else "")
+        text = count_text(lost, "turn is", "turns are") + " missing from the log"
+        text += f", {count_text(back, 'time')} they go back" if back else ""
         yield Text(f"{text}: what was decided then is not proved.", style="yellow")
     if proof.first is not None:
         yield _first("First difference", proof.first, "recorded", "now")
     if proof.strayed or proof.unfounded:
-        text = f"{proof.strayed} commands are not what was decided, {proof.unfounded} were sent without a decision."
+        text = f"{count_text(proof.strayed, 'command is', 'commands are')} not what was decided, "
+        text += f"{count_text(proof.unfounded, 'was', 'were')} sent without a decision."
         yield Text(text, style="red" if proof.strayed else "yellow")
     for (boat, limit_mps), count in proof.cut.items():
-        yield Text(f"{boat}: its autopilot's limit of {limit_mps:g} m/s cut {count} commands.")
+        yield Text(f"{boat}: its autopilot's limit of {limit_mps:g} m/s cut {count_text(count, 'command')}.")
     if proof.first_sent is not None:
         yield _first("First of them", proof.first_sent, "decided", "sent")
     if proof.holds and not replay.proved:

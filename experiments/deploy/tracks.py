@@ -245,5 +245,5 @@ def _meta(header: LogHeader, tracks: Tracks) -> dict[str, Any]:
         "seed": None,
         "reason_names": [reason.name for reason in Reason],
         "platforms": list(tracks.platforms),
-        "title": "as it was",
+        "title": "as it was, shield on",
     }

@@ -92,7 +92,7 @@ FIGURES = {
     "responsible": Figure("", lambda m, c: {s: int((c["responsible"] == k).sum()) for k, s in enumerate(SIDES)}, _WHO),
     "started_outside": Figure("", lambda m, c: m.outside.sum(), _OUTSIDE),
     "violations_outside": Figure(
-        "with violations, started outside",
+        "with violations, started outside the unavoidable set",
         lambda m, c: (m.violated & m.outside).sum(),
         "of those, how many had violations",
     ),

@@ -28,9 +28,10 @@ Water = tuple[np.ndarray, np.ndarray]
 
 def records_with_and_without(scenes: Scenes, safety_filter: str, conditions: Conditions, name: str) -> list[Record]:
     """The first game of some scenes, played with a filter and without, as records that show the same water."""
-    played = [(play(scenes, one, conditions), one) for one in dict.fromkeys((safety_filter, NONE))]
+    words = {safety_filter: f"filter {safety_filter}", NONE: "no filter"}
+    played = [(play(scenes, one, conditions), one) for one in words]
     water = _water_of([one.state[:, 0, :, :2] for one, _ in played], scenes)
-    return [record_of(one, 0, f"{name}, {by}", by != NONE, water) for one, by in played]
+    return [record_of(one, 0, f"{name}, {words[by]}", by != NONE, water) for one, by in played]
 
 
 def replay_worst(worst: Sequence[Mapping[str, Any]], conditions: Conditions, seed: int, path: Path) -> Path:

@@ -15,6 +15,7 @@ from ..baselines.registry import NONE, is_shield
 from ..report import Plot, Report, Section, Table, Tile, made_of, plain
 from ..runner import RESULTS_FILE, Run
 from ..tables import number_text, titled
+from ..words import count_text
 from .figures import FIGURES, WORST
 from .replay import replay_worst
 from .results import Settings
@@ -30,11 +31,10 @@ CONDITIONS |= {"current_mps": "current {:g} m/s"}
 NOTE = (
     "An encounter has a violation when an own boat comes within the radius of any boat. It is avoidable when the own "
     "boat's commands could have kept the radius. '≤ at 95 %' is the one-sided upper limit of the probability of an "
-    "avoidable violation (Clopper and Pearson); those not judged count as avoidable. 'Started outside' are encounters "
-    "in which the shield's safety margin at the first decision was at least 0 for every own boat, whatever filter "
-    "played. Changes are means over the changed steps; time to the goal is against the same scenes without a filter, a "
-    "boat that never arrives counting with the whole length. Closest distances beyond 15 m are cut off; the dashed "
-    "line marks the radius."
+    "avoidable violation (Clopper and Pearson); those not judged count as avoidable. An encounter starts outside the "
+    "unavoidable set when the shield's safety margin at the first decision is at least 0 for every own boat, whatever "
+    "filter plays. Changes are means over the changed steps; time to the goal is against the same scenes without a "
+    "filter, a boat that never arrives counting with the whole length. Closest distances beyond 15 m are cut off."
 )
 
 
@@ -54,19 +54,21 @@ def write_encounter_report(results: Mapping[str, Any], path: Path) -> Path:
     pairs = dict.fromkeys((cell["own"], cell["other"]) for cell in cells)
     worst = [[row[name] for name in WORST] for row in results["worst"]]
     worst = [[f"{value:.2f}" if isinstance(value, float) else plain(value) for value in row] for row in worst]
+    each = count_text(settings["n"], "encounter")
     conditions = [words.format(settings["conditions"][name]) for name, words in CONDITIONS.items()]
     return Report(
         title="Encounters",
-        subtitle=" · ".join([f"{settings['n']} encounters per cell", *conditions, f"seed {settings['seed']}"]),
+        subtitle=" · ".join([f"{each} of each family, with each filter", *conditions, f"seed {settings['seed']}"]),
         tiles=[_tile(safety_filter, cells) for safety_filter in dict.fromkeys(cell["filter"] for cell in cells)],
         links=[{"path": replay, "label": "the worst encounters, with the filter and without"}] if replay else [],
         goals=results["goals"],
+        notes=[NOTE],
         sections=[
             *(_section(pair, cells, settings) for pair in pairs),
             Section(
-                "The worst encounters",
+                "The worst encounters of each filter",
                 [Table("", [head for head, _ in WORST.values()], worst, numbers=False)],
-                NOTE,
+                "Avoidable violations first, then the closest.",
                 wide=True,
             ),
             made_of(results),
@@ -109,7 +111,7 @@ def _plot(family: str, cells: Cells, settings: Mapping[str, Any]) -> Plot:
         for cell in cells
         if cell["filter"] != NONE
     ]
-    words = "closest distance, m: share that came closer"
+    words = "share that came closer than that, m; dashed: radius"
     series = [(name, colour, *distribution(quantiles)) for name, colour, quantiles in curves]
     figure = plots.curves(series, settings["conditions"]["radius_m"], words)
     legend = [(colour, name) for name, colour, _ in curves]
@@ -126,19 +128,20 @@ def distribution(quantiles: Sequence[float]) -> tuple[list[float], list[float]]:
 
 
 def _avoidable_text(cell: Cell) -> Text:
-    words = f"{cell['avoidable']}" + (f"+{cell['not_judged']}?" if cell["not_judged"] else "")
+    told = [str(cell["avoidable"])] if cell["avoidable"] or not cell["not_judged"] else []
+    words = "+".join(told + ([f"{cell['not_judged']}?"] if cell["not_judged"] else []))
     return Text(words, "red" if cell["avoidable"] and is_shield(cell["filter"]) else "")
 
 
 HEADS: dict[str, tuple[str, Any]] = {
     "bare": ("encounters with violations without a filter", "unshielded_violated"),
     "hit": ("with the filter", "violated"),
-    "avoid": ("of these avoidable in hindsight (+ not judged?)", _avoidable_text),
+    "avoid": ("of these avoidable in hindsight (?: not judged)", _avoidable_text),
     "<=%": ("95 % upper limit of the avoidable ones, % of the encounters", lambda c: _text(c, "avoidable_upper")),
     "unav": ("unavoidable, or begun inside the radius", lambda c: f"{c['unavoidable'] + c['started_inside']}"),
-    "out": (
-        "with violations, of those that started outside the unavoidable set",
-        lambda c: f"{c['violations_outside']}/{c['started_outside']}",
+    "out%": (
+        "with violations, % of those that started outside the unavoidable set",
+        lambda c: number_text(100.0 * c["violations_outside"] / c["started_outside"] if c["started_outside"] else None),
     ),
     "near": ("closest distance, m", "closest_m"),
     "chg%": ("commands changed, %", "changed_percent"),
@@ -150,7 +153,8 @@ HEADS: dict[str, tuple[str, Any]] = {
 }
 """Columns of the terminal's table, what they mean, and the figure or how it is written.
 
-Of a thousand encounters they just fit 80 characters."""
+Of a thousand encounters they just fit 80 characters, the family in `FAMILY_LETTERS`."""
+FAMILY_LETTERS = 14
 LEGEND = "; ".join(f"{head}: {words}" for head, (words, _) in HEADS.items())
 
 
@@ -162,9 +166,16 @@ def cells_table(results: Mapping[str, Any]) -> list[Group]:
     tables = []
     for (own, other, safety_filter), cells in groups.items():
         rows = [
-            [c["family"], *(_text(c, of) if isinstance(of, str) else of(c) for _, of in HEADS.values())] for c in cells
+            [_broken(c["family"]), *(_text(c, of) if isinstance(of, str) else of(c) for _, of in HEADS.values())]
+            for c in cells
         ]
         counts = sorted({cell["encounters"] for cell in cells})
-        each = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]}-{counts[-1]}"
+        each = count_text(counts[0], "encounter") if len(counts) == 1 else f"{counts[0]}-{counts[-1]} encounters"
         tables.append(titled(f"{own} meets {other}, filter {safety_filter}, {each} each", ["", *HEADS], rows))
     return tables
+
+
+def _broken(family: str) -> str:
+    """A family's name, a long one in two lines."""
+    at = family.rfind("_", 0, FAMILY_LETTERS) + 1
+    return family if len(family) <= FAMILY_LETTERS or not at else f"{family[:at]}\n {family[at:]}"

@@ -26,7 +26,8 @@ MOST_ENCOUNTERS = 1_000_000
 """Encounters of a family, platform and filter at most: all are listed before the first is played."""
 UNAVOIDABLE_PERCENT = 1.0
 """Most encounters with several others that may have unavoidable violations, %."""
-MOST_WORST = 10
+MOST_WORST, LEAST_WORST = 10, 2
+"""Worst encounters that are shown: of all filters together, at most, and of each one, at least."""
 FAR_M = 1e4
 """A safety margin beyond this, m, says that nobody is near."""
 
@@ -134,7 +135,8 @@ def goals_of(cells: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
         goals.append(_goal(f"{safety_filter}: encounters with avoidable violations", avoidable, 0.0, own))
         if same:
             hit = float(sum(cell["violations_outside"] for cell in same))
-            goals.append(_goal(f"{safety_filter}: started outside, violations of one rammer", hit, 0.0))
+            name = f"{safety_filter}: violations of one rammer, started outside the unavoidable set"
+            goals.append(_goal(name, hit, 0.0))
         if many:
             share = 100.0 * max(cell["unavoidable"] / cell["encounters"] for cell in many)
             goals.append(
@@ -148,15 +150,19 @@ def _goal(name: str, value: float, limit: float, cells: Sequence[Mapping[str, An
     return judged(name, value, "<=", limit, open_=any(cell["not_judged"] for cell in cells))
 
 
-def worst_encounters(columns: Mapping[Cell, Columns], most: int = MOST_WORST) -> list[dict[str, Any]]:
-    """The worst encounters of all cells with a shield: avoidable violations first, then the closest.
+def worst_encounters(columns: Mapping[Cell, Columns]) -> list[dict[str, Any]]:
+    """The worst encounters of each filter, of none where there is no other: avoidable ones first, then the closest."""
+    filters = list(dict.fromkeys(cell.filter for cell in columns))
+    filters = [name for name in filters if name != NONE] or filters
+    most = max(LEAST_WORST, MOST_WORST // max(1, len(filters)))
+    return [one for name in filters for one in _worst_of(name, columns, most)]
 
-    Without such a cell, those with another filter, or with none.
-    """
-    shields = [cell for cell in columns if is_shield(cell.filter)]
+
+def _worst_of(safety_filter: str, columns: Mapping[Cell, Columns], most: int) -> list[dict[str, Any]]:
     found = []
-    for cell in shields or [cell for cell in columns if cell.filter != NONE] or columns:
-        values = columns[cell]
+    for cell, values in columns.items():
+        if cell.filter != safety_filter:
+            continue
         for k in np.lexsort((values["closest_m"], -values["avoidable"]))[:most]:
             one: dict[str, Any] = {**cell._asdict(), **{name: float(column[k]) for name, column in values.items()}}
             one["violations"] = one["violations_teammate"] + one["violations_opponent"]

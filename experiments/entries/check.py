@@ -14,6 +14,7 @@ from steerclear.shield.exceptions import PolicyError
 
 from ..play.match import Match
 from ..play.spec import MatchSpec
+from ..words import count_text
 from .imports import imports_of
 from .team import EntryTeam
 
@@ -23,9 +24,12 @@ OPPONENT = "hold"
 
 def headline(found: dict[str, Any]) -> str:
     """Whether an entry plays, which boats failed how often and whether it is in time; in one sentence."""
-    but = [f"{boat} failed in {count} of {found['steps']} steps" for boat, count in found["failed_steps"].items()]
+    but = [
+        f"{boat} failed in {count} of {count_text(found['steps'], 'step')}"
+        for boat, count in found["failed_steps"].items()
+    ]
     if always_late(found):
-        but.append(f"all {found['decisions']} decisions took longer than the game gives")
+        but.append(f"all {count_text(found['decisions'], 'decision')} took longer than the game gives")
     return f"{found['entry']} loads in {found['load_s']:.1f} s and plays{', but ' if but else ''}{', '.join(but)}"
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,8 +15,10 @@ from ..ablation import AblationSettings
 from ..metrics import check, game_goals, violation_column
 from ..play.spec import MatchSpec
 from ..report import Report, Section
+from ..runner import Experiment
 from ..statistics import paired_difference
-from ..tables import Table, interval_text
+from ..tables import IN_ZIP, Table, interval_text
+from ..words import count_text
 from ..workers import Row
 from .wrap import game_spec, own_files, shielded_files, write_zip
 
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 PAGE, ZIP = "entry.html", "shielded.zip"
-BARE, IN_ZIP, AROUND = "entry alone", "shield in the zip", "shield round the game"
+BARE, AROUND = "entry alone", "shield round the game"
 """What a figure is of: no shield, that of the zip that is handed in, or one that decides ten times a second."""
 SUMS = ("captures", "captures_against", "teammates", "opponents", "collisions")
 HEADS = [
@@ -60,6 +62,10 @@ class EntryGames(AblationSettings):
         handed_in = AblationSettings(**{**own, "own": self.zip_file, "states": (False,)})
         return super().specs() + (handed_in.specs() if self.zip_file else [])
 
+    def experiment(self, command: str) -> Experiment:
+        """What `runner.execute` runs; it tells first how many games that are."""
+        return replace(super().experiment(command), about=self.how_many())
+
     def goals(self, table: pd.DataFrame) -> list[dict[str, Any]]:
         """Judge the zip, which is handed in, and then the shield round the game, each against the bare entry."""
         import pandas as pd
@@ -79,14 +85,19 @@ class EntryGames(AblationSettings):
         """Which shield the figures of a pairing are of."""
         if self.zip_file and pairing.startswith(f"{self.zip_file} vs "):
             return {"off": IN_ZIP}
-        return {"off": BARE, "on": AROUND, "difference": "difference, paired"}
+        off = super().heads(pairing).get("off", BARE)
+        return {"off": off, "on": AROUND, "difference": "difference, paired"}
 
     def how_many(self) -> str:
         """How many games that are, in words."""
-        ways = ", ".join([BARE, *([IN_ZIP] if self.zip_file else []), AROUND])
-        each, number = f"{self.games} game{'s' if self.games != 1 else ''}", len(self.opponents)
+        ways, number = ", ".join(self.ways()), len(self.opponents)
         against = f"each of {number} opponents" if number != 1 else self.opponents[0]
-        return f"{each} against {against}; {ways}: {len(self.specs())} games in all"
+        total = count_text(len(self.specs()), "game")
+        return f"{count_text(self.games, 'game')} against {against}; {ways}: {total} in all"
+
+    def ways(self) -> list[str]:
+        """Names of the ways each game is played, in order."""
+        return [self.heads("")["off"], *([IN_ZIP] if self.zip_file else []), AROUND]
 
 
 def shielded_zip(
@@ -139,7 +150,6 @@ def entry_report(rows: Sequence[Row], settings: EntryGames) -> Report:
     import pandas as pd
 
     groups = by_opponent(rows, settings)
-    ways = [BARE, *([IN_ZIP] if settings.zip_file else []), AROUND]
     body = [_line(Path(name).name, games, settings.seed) for name, games in groups.items()]
     if len(body) > 1:
         together = [pd.concat(games) for games in zip(*groups.values(), strict=True)]
@@ -148,7 +158,9 @@ def entry_report(rows: Sequence[Row], settings: EntryGames) -> Report:
     return Report(
         f"{Path(settings.own).name} and the shield",
         f"{settings.preset}, the shield keeps {settings.separation_m:g} m: {settings.how_many()}, from the same seeds.",
-        sections=[Section(f"Sums of all games, {' → '.join(ways)}", [Table("", HEADS, body)], words, wide=True)],
+        sections=[
+            Section(f"Sums of all games, {' → '.join(settings.ways())}", [Table("", HEADS, body)], words, wide=True)
+        ],
     )
 
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from steerclear.shield.bridge.blackbox import LogReader
 
+from ..words import count_text
 from .runs import COMMANDED, NEEDED, SEEN, FitError, Notice, Run, Streams, silent, spans
 
 EARTH_M = 6378137.0
@@ -309,7 +310,7 @@ def _check_enough(runs: Sequence[Run], pieces: int) -> None:
     """See that the boat turned, stopped and started, else `FitError`, whose text says what to drive."""
     remedy = "drive a sea-trial and give its log"
     if pieces < FEWEST_RUNS:
-        raise FitError(f"the logs hold {pieces} runs, fewer than {FEWEST_RUNS}; {remedy}")
+        raise FitError(f"the logs hold {count_text(pieces, 'run')}, fewer than {FEWEST_RUNS}; {remedy}")
     top = max(float(run.seen[:, 3].max()) for run in runs)
     turned, changed = (max(float(np.ptp(run.seen[:, column])) for run in runs) for column in (2, 3))
     if top < FEWEST_SPEED_MPS or turned < FEWEST_TURNING_DEG or changed < FEWEST_SPEED_MPS:

@@ -12,6 +12,8 @@ import numpy as np
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array
 
+from ..words import count_text
+
 STEP_S = 0.1  # step of the grid and of the model, s
 SHORTEST_S = 3.0  # shorter runs show nothing
 RATE_STEPS = 2  # turn rates are taken over so many steps
@@ -132,7 +134,7 @@ def _without_jumps(run: Run, top_mps: float, notice: Notice) -> list[Run]:
     far_m = max(float(np.hypot(*(run.seen[b, :2] - run.seen[a, :2]))) for a, b in jumping)
     first_s = run.begin_s + jumping[0][0] * STEP_S
     words = f"first at {first_s:.1f} s, by {far_m:.0f} m at most; cut there"
-    notice(f"{run.name}: its position jumps {len(jumping)} times, {words}")
+    notice(f"{run.name}: its position jumps {count_text(len(jumping), 'time')}, {words}")
     cuts = [k for a, b in jumping for k in range(a + 1, b + 1)]
     return run.parts(list(pairwise([0, *cuts, len(run.seen)])))
 

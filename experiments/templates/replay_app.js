@@ -11,6 +11,7 @@ class Player {
     this.view = { zoom: 1, centre: null };
     this.options = { trail: 20, separation: true, tag: true, commands: true, names: true, followed: null };
     this.panes = [];
+    byId("show-tag").parentElement.style.display = games.some(hasFlags) ? "" : "none";
     this.readColours();
     this.setPanes(games.length > 1 ? 2 : 1);
   }

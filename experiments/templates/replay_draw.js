@@ -45,7 +45,7 @@ function drawField(context, game, camera, colours, options) {
   context.lineWidth = 1;
   for (let x = 10; x < width; x += 10) drawLine(context, camera, x, 0, x, height);
   for (let y = 10; y < height; y += 10) drawLine(context, camera, 0, y, width, y);
-  drawScrimmage(context, game, camera, colours);
+  if (hasFlags(game)) drawScrimmage(context, game, camera, colours);
   game.meta.flag_home.forEach(([x, y], team) => {
     if (options.tag) {
       fillAndRing(context, camera, x, y, game.meta.catch_radius_m, teams[team], 0.1, 1, [5, 5]);

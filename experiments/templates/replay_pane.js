@@ -8,6 +8,12 @@ function element(tag, properties = {}, ...children) {
   return made;
 }
 
+/** How many things there are: 1 hit, 2 hits. */
+const countText = (count, one) => `${count} ${one}${count === 1 ? "" : "s"}`;
+
+/** Whether a game is for flags; an encounter has none, nor halves of a field. */
+const hasFlags = (game) => game.meta.catch_radius_m > 0;
+
 function numberText(value, digits) {
   return Number.isFinite(value) ? value.toFixed(digits).replace("-", "−") : "–";
 }
@@ -61,14 +67,15 @@ class Pane {
     const badge = (kind, ...parts) => element("span", { className: `badge ${kind}` }, ...parts);
     const covered = meta.shielded.length > 0, violated = this.game.ownViolations.length > 0;
     this.badges.replaceChildren(
-      badge(covered ? "on" : "", this.sideText(this.game.ownTeam), covered ? ` shielded, ${meta.shielded.length} boats` : " without a shield"), " ",
+      badge(covered ? "on" : "", this.sideText(this.game.ownTeam), covered ? ` shielded, ${countText(meta.shielded.length, "boat")}` : " without a shield"), " ",
       badge(violated ? "violation" : "", ...this.violationText()));
     const word = (text, kind) => element("span", { className: kind, textContent: text });
     this.note.replaceChildren("timeline: ", word("share of boats whose command was changed", "orange"), ", ",
-      word("hits", "pink"), ", captures · table: speeds m/s, compass headings, margin = safety margin, room beyond the required distance, m · ",
+      word("hits", "pink"), hasFlags(this.game) ? ", captures" : "", " · table: speeds m/s, compass headings, margin = safety margin, room beyond the required distance, m · ",
       `hit: a boat of `, this.sideText(this.game.ownTeam), ` within ${meta.separation_m} m of another, discs touch; `,
       `dashed rings: the other team among itself · `,
-      `${meta.preset}, ${[...new Set(meta.platforms)].join(", ")}, seed ${meta.seed ?? "unknown"}`);
+      [meta.preset, ...new Set(meta.platforms), ...(meta.seed === null ? [] : [`seed ${meta.seed}`])].join(", "));
+    this.score.hidden = !hasFlags(this.game);
     this.rows.replaceChildren(...meta.agent_ids.map((name, boat) => this.makeRow(name, boat)));
     this.player.changed();
   }
@@ -81,7 +88,7 @@ class Pane {
   /** How often boats came too close, the other team among itself apart: no shield answers for that. */
   violationText() {
     const { ownTeam, ownViolations, violations } = this.game, other = violations.length - ownViolations.length;
-    const parts = [this.sideText(ownTeam), `: ${ownViolations.length} hit${ownViolations.length === 1 ? "" : "s"}`];
+    const parts = [this.sideText(ownTeam), `: ${countText(ownViolations.length, "hit")}`];
     return other ? [...parts, ` (and ${other} among `, this.sideText(1 - ownTeam), ")"] : parts;
   }
 

@@ -27,6 +27,7 @@ from steerclear.shield.jit import Array, BoolArray
 from steerclear.shield.platforms import layout as L
 from torch import nn
 
+from ..words import count_text
 from .config import Config
 from .env import TrainEnv, core_of, pool_of, set_tags, shield_of
 from .opponents import Pool
@@ -342,7 +343,7 @@ class RaidsTraining(Training):
         seed, found = self.config.seed, []
         for part, spread in enumerate(self.config.options.recorded, start=1):
             found += recorded(self.config, spread, part * RECORDED_SEED + seed)
-            notice(0, f"moments recorded in {part * self._all.size} games")
+            notice(0, f"moments recorded in {count_text(part * self._all.size, 'game')}")
         core, shares = self.batch.core, self.config.options.shares
         self._begun = BeginInRaids(core, found, shares, seed)
         self.env.play_as_stage_says()

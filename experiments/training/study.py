@@ -18,6 +18,7 @@ from ..metrics import Metric
 from ..result_files import finite, lock_folder, read_json, told_settings
 from ..runner import EXPERIMENT_FILE, RESULTS_FILE, ROWS_FILE, Experiment, Interrupted, execute
 from ..statistics import Interval, difference, figure, student_interval
+from ..words import count_text
 from ..workers import Job, Row, end_failed
 from .config import SHIELDS, Config, config_of
 from .training import CURVE, FINAL, play_games, summary_of, training_of
@@ -173,7 +174,7 @@ def _what_was_done(settings: Mapping[str, Any], rows: pd.DataFrame) -> str:
     training = settings["training"]
     counts = rows.groupby(["shield", "collision", "opponent"]).size()
     fewest, most = counts.min(), counts.max()
-    trainings = f"{most} training(s)" if fewest == most else f"{fewest} or {most} trainings"
+    trainings = count_text(most, "training") if fewest == most else f"{fewest} or {most} trainings"
     pool = dict.fromkeys(name for stage in training.get("stages", []) for name in stage["opponents"])
     learned = f" against {line(', '.join(pool))}" if pool else ""
     rules = ", ".join(f"{name} {value}" for name, value in training.get("rules", {}).items())
@@ -181,7 +182,8 @@ def _what_was_done(settings: Mapping[str, Any], rows: pd.DataFrame) -> str:
         f"{trainings} a cell, of {training['decisions']:,} decisions of a boat, each held for "
         f"{training['interval']} game steps{learned}, on {line(training['preset'])}"
         f"{line(f' with {rules}') if rules else ''}; in training the shield is asked every "
-        f"{training.get('shield_every', 1)} game step(s), afterwards in each. Then {settings['games']} games a "
+        f"{count_text(training.get('shield_every', 1), 'game step')}, afterwards in each. Then "
+        f"{count_text(settings['games'], 'game')} a "
         "training and opponent from the same seeds. Means per game; brackets are 95 % intervals, over games for what "
         "each training brought (bootstrap; hits: exact Poisson limits), over trainings (Student's t) for what another "
         "training would bring. Hits are counted per boat, at the game's distance."

@@ -111,7 +111,7 @@ class RegisteredBarriers:
             if faults:
                 say_once(
                     f"margin of {name}",
-                    f"barrier {name!r} gave no usable margin ({faults} times in one decision): NaN, an error, or a "
+                    f"barrier {name!r} gave no usable margin (faults in one decision: {faults}): NaN, an error, or a "
                     "slope beyond 10 m per m; boats keep out of there, and stop where it is so. Find out why by "
                     "check_barrier of steerclear.experiments.conformance",
                 )

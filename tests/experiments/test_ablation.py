@@ -287,7 +287,7 @@ def failing(own=0, other=0, text=None, usable=(7, 7), steps=10):
     [
         ([failing(), failing(1200, 0, "own: 'a'")], "own policy failed 1,200 times, in 1 of 2 games"),
         ([failing(0, 3, "opponent: no"), failing(0, 4)], "opponents' policy failed 7 times, in 2 of 2 games"),
-        ([failing(1, 0, "own: no")], "own policy failed 1 time, in 1 of 1 games"),
+        ([failing(1, 0, "own: no")], "own policy failed 1 time, in 1 of 1 game"),
     ],
 )
 def test_failures_are_counted_and_the_first_is_quoted(rows, words):

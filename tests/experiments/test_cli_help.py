@@ -52,6 +52,18 @@ def test_help_all_shows_every_option(name):
     assert not any(re.search(rf"{option}\b", shown(name)) for option in options & RARE)
 
 
+def test_help_names_whom_opponents_are_taken_for_wherever_a_shield_plays():
+    taking = [name for name, one in COMMANDS.items() if any("--profile" in each.opts for each in one.params)]
+    assert len(taking) > 4
+    assert all("--profile" in shown(name) for name in taking)
+
+
+def test_the_list_of_platforms_says_what_each_boat_is():
+    said = CliRunner().invoke(app, ["platform", "show"]).output
+    assert "mctf2024_sim: The 2024 simulator's own boat" in said
+    assert "si: speed and turn rate are there at once" in said
+
+
 def test_every_rare_option_is_some_commands_and_every_example_of_a_command():
     options = {option for command in COMMANDS.values() for each in command.params for option in each.opts}
     assert options >= RARE

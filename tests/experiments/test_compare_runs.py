@@ -144,7 +144,7 @@ def test_the_command_shows_the_table_and_writes_what_is_documented(folders, tmp_
     file = tmp_path / "c.json"
     done = run("compare", *folders, "--json", file)
     assert done.exit_code == ExitCode.OK, done.output
-    assert "differs: shield.profile: default -> ramming" in done.stdout
+    assert "differs: shield.profile: default in A, ramming in B" in done.stdout
     assert "against easy: 3 pairs" in done.stdout
     assert "1.00 [0.00, 2.0]" in done.stdout
     assert "fewer than 20 pairs say little" in done.stdout

@@ -38,7 +38,7 @@ def test_a_metric_of_one_line_reaches_rows_table_report_and_keys(monkeypatch, tm
     assert {"off", "on", "difference"} <= set(figures)
     assert "slowest, m/s" in printed(pairing_table(results["pairings"][0]), 80)
     write_results(run, results)
-    page = (tmp_path / "report.html").read_text()
+    page = (tmp_path / "report.html").read_text().replace("\u00a0", " ")
     assert "lowest speed of an own boat" in page
     assert interval_text(figures["on"]) in page
     content = json.loads((tmp_path / "results.json").read_text())

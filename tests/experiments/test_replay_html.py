@@ -9,7 +9,10 @@ from importlib.resources import files
 import numpy as np
 import pytest
 from steerclear.env.record import find_violations, read_meta
-from steerclear.experiments.replay_html import SCRIPTS, at_one_radius, pack, write_replay
+from steerclear.experiments.encounters.replay import records_with_and_without
+from steerclear.experiments.encounters.scenarios import draw
+from steerclear.experiments.encounters.scene import Conditions
+from steerclear.experiments.replay_html import SCRIPTS, at_one_radius, game_title, pack, write_replay
 from steerclear.shield.exceptions import ConfigError
 
 NODE = shutil.which("node")
@@ -173,3 +176,26 @@ def test_the_pages_own_reader_agrees(game_record):
     assert read["score"] == [1, 0]
     middle = game_record["position"][3:5, 0].mean(axis=0)
     assert [read["half"]["x"], read["half"]["y"]] == pytest.approx(middle, abs=1e-3)
+
+
+PANE = """
+const game = (catchRadius, seed) => ({ meta: { catch_radius_m: catchRadius, seed } });
+console.log(JSON.stringify([countText(1, "boat"), countText(6, "boat"), hasFlags(game(10)), hasFlags(game(0))]));
+"""
+
+
+@pytest.mark.skipif(NODE is None, reason="the page's own words are made in node where there is one")
+def test_the_page_counts_in_words_and_knows_a_game_from_an_encounter():
+    pane = (files("steerclear.experiments") / "templates" / "replay_pane.js").read_text() + PANE
+    answer = subprocess.run([NODE, "-e", pane], capture_output=True, text=True, check=True)
+    assert json.loads(answer.stdout) == ["1 boat", "6 boats", True, False]
+
+
+def test_an_encounter_is_named_by_its_filter_and_no_seed_is_made_up():
+    scenes = draw("head_on", "heron", "heron", Conditions(), 0, 0, 1)
+    records = records_with_and_without(scenes, "parabolic", Conditions(), "head_on 0")
+    assert [game_title(read_meta(record)) for record in records] == [
+        "head_on 0, filter parabolic",
+        "head_on 0, no filter",
+    ]
+    assert "unknown" not in (files("steerclear.experiments") / "templates" / "replay_pane.js").read_text()

@@ -234,6 +234,32 @@ def deaf(job):
     return [{"number": job["number"]}]
 
 
+def test_what_an_experiment_is_about_is_told_once_nothing_refuses_it(tmp_path):
+    told = []
+    about = Experiment("test", {}, jobs("slow"), work, about="one game in all")
+    execute(about, tmp_path, tell=told.append)
+    assert told == ["one game in all"]
+    with pytest.raises(ConfigError, match="already holds results"):
+        execute(about, tmp_path, tell=told.append)
+    assert told == ["one game in all"]
+
+
+def say_that_it_compiles(job):
+    """A job whose process would say what the compiler says."""
+    workers.LOG.warning("steerclear %s, once", workers.COMPILES)
+    workers.LOG.warning("%s is its own", job)
+    time.sleep(0.3)  # so that the other process has its share
+    return []
+
+
+def test_of_many_processes_one_says_that_code_is_compiled(capfd):
+    for _ in range(2):
+        assert len(list(outcomes(say_that_it_compiles, ["a", "b", "c", "d"], 2))) == 4
+    said = capfd.readouterr().err
+    assert said.count(workers.COMPILES) <= 1, "another test's processes may have said it"
+    assert said.count("is its own") == 8
+
+
 @pytest.fixture
 def heeded():
     """Signals are heeded, also where a shell started the tests in the background."""

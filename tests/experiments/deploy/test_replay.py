@@ -338,7 +338,7 @@ WRITTEN_ANEW = {
         lambda ticks: lied(ticks, 30, 1e-12),
         (1,),
         (
-            f"{STEPS - 1} of {STEPS} decisions are the same, 1 differ",
+            f"{STEPS - 1} of {STEPS} decisions made again the same, 1 differ",
             "First difference: turn 30 at 3.00 s, blue_1, safety_margin_m",
         ),
     ),
@@ -346,8 +346,8 @@ WRITTEN_ANEW = {
         lambda ticks: [*ticks[:29], *(lied([tick], 0)[0] for tick in ticks[30:])],
         (3,),
         (
-            f"{STEPS - 30} differ after turns missing from the log and are not proved (1 gaps)",
-            "1 turns are missing from the log",
+            f"{STEPS - 30} differ after turns missing from the log and are not proved (1 gap)",
+            "1 turn is missing from the log",
             "NOT PROVED",
         ),
     ),
@@ -366,7 +366,7 @@ WRITTEN_ANEW = {
         ("no decision of the shield: nothing is proved", f"{2 * STEPS} were sent without a decision"),
     ),
     "decisions left out in between": (lambda ticks: bare(ticks, (60, 61)), (1, 3), ("4 were sent without a decision",)),
-    "a turn that stands twice": (lambda ticks: [*ticks[:20], ticks[19], *ticks[20:]], (3,), ("1 times they go back",)),
+    "a turn that stands twice": (lambda ticks: [*ticks[:20], ticks[19], *ticks[20:]], (3,), ("1 time they go back",)),
     "commands an autopilot cut": (
         lambda ticks: all_sent(ticks, lambda one: {"speed_mps": min(one.speed_mps, 0.5), "limit_mps": 0.5}),
         (0,),

@@ -11,7 +11,8 @@ from steerclear.experiments.console import ExitCode
 from steerclear.experiments.encounters import Conditions, draw, play, results
 from steerclear.experiments.encounters.replay import record_of
 from steerclear.experiments.encounters.report import cells_table
-from steerclear.experiments.encounters.results import Cell, goals_of
+from steerclear.experiments.encounters.results import Cell, goals_of, worst_encounters
+from steerclear.experiments.encounters.scenarios import FAMILIES
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
 
@@ -95,4 +96,38 @@ def test_the_table_of_a_thousand_encounters_cuts_nothing_off_at_80_columns():
     text = shown.get()
     assert "…" not in text
     heads, row = (text.splitlines()[k].split() for k in (1, 3))
-    assert (row[0], row[heads.index("out") + 1], row[heads.index("lost") + 1]) == ("crossing_right", "0/1000", "41.7")
+    assert (row[0], row[heads.index("out%") + 1], row[heads.index("lost") + 1]) == ("crossing_right", "0.00", "41.7")
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_no_column_of_a_family_goes_into_a_further_table_at_80_columns(family):
+    """Of all encounters violated, none judged, by a filter that takes its time."""
+    counts = ("unshielded_violated", "violated", "not_judged", "violations_outside", "started_outside", "encounters")
+    means = dict.fromkeys(("closest_m", "goal_time_ratio", "changed_percent", "reversals_per_min"), 10.6)
+    more = {"avoidable": 0, "unavoidable": 0, "started_inside": 0, "deadlocked": 0, "decision_us": 813.0}
+    more |= {"avoidable_upper": 1.0, "never_arrived_percent": 41.7}
+    cell = Cell("none", "heron", "heron", family)._asdict() | dict.fromkeys(counts, 1000) | means | more
+    console = Console(width=80)
+    with console.capture() as shown:
+        console.print(*cells_table({"cells": [cell]}))
+    text = shown.get()
+    assert sum("─" in line for line in text.splitlines()) == 1, text
+    assert " 1000? " in text
+    assert "1,000 encounters each" in text
+
+
+def test_the_worst_encounters_of_every_filter_are_shown():
+    columns = {
+        Cell(name, "heron", "heron", family): {
+            **dict.fromkeys(("number", "variant", "violations_teammate", "violations_opponent"), np.arange(20.0)),
+            **dict.fromkeys(("avoidable", "responsible", "last_preventable_s", "start_safety_margin_m"), np.zeros(20)),
+            "closest_m": closest_m + np.arange(20.0),
+        }
+        for name, closest_m in (("none", 0.0), ("shield", 2.6), ("gatekeeper", 1.0))
+        for family in ("rammer_1", "head_on")
+    }
+    worst = worst_encounters(columns)
+    assert [one["filter"] for one in worst] == ["shield"] * 5 + ["gatekeeper"] * 5
+    assert [one["closest_m"] for one in worst[:3]] == [2.6, 2.6, 3.6]
+    bare = {cell: values for cell, values in columns.items() if cell.filter == "none"}
+    assert {one["filter"] for one in worst_encounters(bare)} == {"none"}

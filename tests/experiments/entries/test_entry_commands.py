@@ -29,6 +29,7 @@ def test_a_check_tells_what_an_entry_imports_how_long_it_takes_and_that_it_plays
     assert "loads in" in done.stdout
     assert "numpy" in done.stdout
     assert "not installed here: nowhere_is" in done.stdout
+    assert "in 3 s against boats that hold its boats made 0 captures, 0 grabs, 0 tags; the game counted " in done.stdout
     content = json.loads(Path("a.json").read_text())
     assert undocumented(content, KEYS["entry check"]) == []
     told = {"calls": 9, "held": 0, "decision_ms": 1000.0, "decisions": 3, "steps": 3, "failed_steps": {}}
@@ -126,6 +127,7 @@ def test_a_report_is_a_page_with_the_games_to_look_at(write_entry):
 
 def test_a_report_of_an_entry_that_has_a_shield_or_of_other_rules_plays_no_zip(write_entry, monkeypatch):
     def played(command, settings, where, quick):
+        assert settings.experiment(command).about == settings.how_many(), "it is said once nothing refuses the games"
         raise PolicyError(f"zip {settings.zip_file!r}, {settings.how_many()}")
 
     monkeypatch.setattr("steerclear.experiments.cli_entry.run_games", played)
@@ -167,7 +169,7 @@ ROWS = [
 def test_figures_of_the_page_are_of_games_played_in_every_way_and_names_are_text(zip_file, more, figures, tmp_path):
     told = {"own": "us", "opponents": ("<them>",), "games": 4, "shield": {"separation_m": 4.0}}
     settings = EntryGames(preset="mctf2026", zip_file=zip_file, **told)
-    page = entry_report([*ROWS, *more], settings).write(tmp_path / "entry.html").read_text()
+    page = entry_report([*ROWS, *more], settings).write(tmp_path / "entry.html").read_text().replace("\u00a0", " ")
     for words in (*figures, "&lt;them&gt;"):
         assert words in page, words
     assert "<them>" not in page

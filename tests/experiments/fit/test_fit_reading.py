@@ -202,7 +202,7 @@ def broken(rows, case):
 @pytest.mark.parametrize(
     ("case", "words"),
     [
-        ("a jump of 200 m", "its position jumps 1 times, first at .* s, by 200 m at most; cut there"),
+        ("a jump of 200 m", "its position jumps 1 time, first at .* s, by 200 m at most; cut there"),
         ("one position 200 m off", "its position jumps .* cut there"),
         ("positions frozen", "are left out: by its speeds the boat went"),
         ("clock set back", "its clock was set back by 19.9 s; cut there"),

@@ -45,7 +45,7 @@ def test_the_page_tells_every_cell_with_its_interval(tmp_path):
     settings = {"seeds": 2, "games": 3, "training": training}
     write_pages([{"command": "train-study", "settings": settings, "rows": rows}], tmp_path)
     page = (tmp_path / "learning.md").read_text()
-    assert "2 training(s) a cell, of 1,000 decisions" in page
+    assert "2 trainings a cell, of 1,000 decisions" in page
     write_pages([{"command": "train-study", "settings": settings, "rows": rows[:-1]}], tmp_path)
     assert "1 or 2 trainings a cell, of 1,000 decisions" in (tmp_path / "learning.md").read_text()
     assert "game steps against medium, on aamas2024;" in page
