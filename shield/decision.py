@@ -31,14 +31,13 @@ class Reason(IntEnum):
     """The command nearest to the nominal one that satisfies what the backups satisfy. `Decision.solver` names what
     found it; the full boat model has verified it."""
     QP = workspace.LEAST_CHANGE
-    """The name in 0.8.0 and before, for answers of the QP only."""
+    """Another name of `LEAST_CHANGE`, for stored data."""
     QP_RELAXED = workspace.QP_RELAXED
-    """Only in logs of 0.2.0 and before: the QP's answer with slack."""
+    """Only in old logs: the QP's answer with slack."""
     BACKUP = workspace.BACKUP
-    """The boat's backup manoeuvre, which clears all boats. In 0.8.0 and before also a part of it, since then a
-    `LEAST_CHANGE`."""
+    """The boat's backup manoeuvre, which clears all boats."""
     ESCAPE = workspace.BACKUP
-    """The name of `BACKUP` in 0.2.0 and before, for stored data."""
+    """Another name of `BACKUP`, for stored data."""
     BEST_EFFORT = workspace.BEST_EFFORT
     """No manoeuvre satisfies the required margin; this is the best one found."""
     HELD = workspace.HELD
