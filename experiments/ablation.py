@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 
 COVERED_DIFFERENCE = f"{DIFFERENCE}_{COVERED}"
 """What the difference of covered and off is called in results; that of on and off is `DIFFERENCE`."""
+DIFFERENCES = dict.fromkeys((DIFFERENCE, COVERED_DIFFERENCE), "difference, paired")
+"""Heads of both where the first of two is no "off"."""
 RETIRED = ("qp_relaxed", "escape")
 """Reasons that only rows of earlier versions name."""
 TIMED = ("wall_s", "decision_p50_us", "decision_p99_us", "decision_max_us")
@@ -131,7 +133,7 @@ class AblationSettings:
     def heads(self, pairing: str) -> dict[str, str]:
         """By state (off, on, difference) what a pairing's tables call it, where not as `tables.COLUMNS` does."""
         made = made_of(self.own)
-        off = {OFF: ITS_OWN} if made is not None and made.shielded else {}
+        off = {OFF: ITS_OWN, **DIFFERENCES} if made is not None and made.shielded else {}
         return off | ({ON: COVERED_HEAD if self.shield_autopilot else LEFT_HEAD} if any(self.states) else {})
 
     def experiment(self, command: str) -> Experiment:

@@ -11,7 +11,7 @@ from steerclear.env.config import GameConfig
 from steerclear.policies.submissions.made_for import made_for
 from steerclear.policies.submissions.stage import Stage
 
-from ..ablation import AblationSettings
+from ..ablation import DIFFERENCES, AblationSettings
 from ..metrics import check, game_goals, violation_column
 from ..play.spec import MatchSpec
 from ..report import Report, Section
@@ -85,8 +85,7 @@ class EntryGames(AblationSettings):
         """Which shield the figures of a pairing are of."""
         if self.zip_file and pairing.startswith(f"{self.zip_file} vs "):
             return {"off": IN_ZIP}
-        off = super().heads(pairing).get("off", BARE)
-        return {"off": off, "on": AROUND, "difference": "difference, paired"}
+        return {"off": super().heads(pairing).get("off", BARE), "on": AROUND, **DIFFERENCES}
 
     def how_many(self) -> str:
         """How many games that are, in words."""
