@@ -70,7 +70,7 @@ def covered_table(summary: Mapping[str, Any]) -> Group | None:
     """Of the games whose shield also covered boats that the game drives; None where there are none."""
     if not summary.get("games_covered"):
         return None
-    shown = {key: head for key, head in COLUMNS.items() if "covered" in key}
+    shown = {key: head for key, head in columns_of(summary).items() if "covered" in key}
     chosen = [v for k, v in summary["metrics"].items() if k.startswith("violations_") or k in _COVERED_SHOWN]
     return figures_table("Covering boats that the game drives", chosen, shown)
 
