@@ -182,7 +182,8 @@ def _ended(
     axis.grid(axis="x", color=COLOURS["line"], lw=0.8)
     if reference is not None:
         axis.axvline(reference, color=COLOURS["mark"], ls="--", lw=1.3)
-    axis.set_xlim(left=min(0.0, axis.get_xlim()[0]), right=axis.get_xlim()[1] * 1.08)
+    low, high = axis.get_xlim()
+    axis.set_xlim(left=min(0.0, low) if axis.dataLim.x1 > 0.0 else 0.0, right=high * 1.08)  # not below 0 where all is 0
     if turned:
         axis.invert_yaxis()
 
