@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache, partial
+from functools import cache, lru_cache
 from importlib.util import find_spec
 from multiprocessing.context import SpawnContext
 from multiprocessing.synchronize import Semaphore
@@ -26,7 +26,6 @@ from typing import Any, NoReturn
 
 from steerclear.shield.exceptions import ConfigError, SteerclearError
 from steerclear.shield.extras import install_command
-from steerclear.shield.jit import LOG
 
 from .provenance import available_cores, code_digest, package_version
 
@@ -57,8 +56,9 @@ MACHINE = {
 """What a machine may refuse, with what helps."""
 _INTERRUPTED = threading.Event()
 """Set once a signal asks for the end: compiled code and callbacks may lose the KeyboardInterrupt that it raises."""
-COMPILES = "compiles its machine code"
-"""In what the compiler says of itself; of all processes one says it, and one is enough."""
+LOG, COMPILES = logging.getLogger("steerclear.shield.jit"), "compiles its machine code"
+"""Who says that machine code is compiled, and words of that: of this process and its workers one says it."""
+_FIRST = list[Semaphore]()
 _ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
 
 
@@ -275,20 +275,22 @@ def _spawning() -> SpawnContext:
     return multiprocessing.get_context("spawn")
 
 
-@cache
 def _first_word() -> Semaphore:
-    """Who gets it of all processes may say that machine code is compiled; this one, where it has to before others."""
-    first = _spawning().Semaphore(1)
-    LOG.addFilter(partial(_may_say, first))
-    return first
+    """What the process takes that says it."""
+    if not _FIRST:
+        _FIRST.append(_spawning().Semaphore(1))
+    return _FIRST[0]
 
 
-def _may_say(first: Semaphore, record: logging.LogRecord) -> bool:
-    return COMPILES not in record.getMessage() or first.acquire(block=False)
+def _may_say(record: logging.LogRecord) -> bool:
+    return COMPILES not in record.getMessage() or _first_word().acquire(block=False)
+
+
+LOG.addFilter(_may_say)
 
 
 def _begin_worker(first: Semaphore) -> None:
-    LOG.addFilter(partial(_may_say, first))
+    _FIRST[:] = [first]
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; only the parent answers
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     if (parent := multiprocessing.parent_process()) is not None:
