@@ -249,6 +249,12 @@ class GameConfig:
         return self.build(**{**current, **overrides})
 
 
+def of_the_config(name: str) -> str:
+    """Return what to do with a setting of the game that was given to the game itself; empty: it is none."""
+    words = f"it is a setting of the game: give GameConfig.preset(name, {name}=...)"
+    return words if name in GameConfig.names() else ""
+
+
 def as_config(config: GameConfig | str | None) -> GameConfig:
     """Return a `GameConfig` from itself, a preset's name, or None (the ``mctf2025`` preset).
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from steerclear.shield.arrays import NoNumbersError, numbers
+from steerclear.shield.calls import checked_calls
 from steerclear.shield.exceptions import GameError
 from steerclear.shield.jit import Array, BoolArray, IntArray
 from steerclear.shield.shared import share
@@ -15,7 +16,7 @@ from steerclear.shield.workspace import LARGEST_COMMAND
 
 from .advance import CHUNK, advance_games, begin_decision, end_decision, follow_games, move_games
 from .arrays import make_games, make_rules
-from .config import GameConfig, as_config
+from .config import GameConfig, as_config, of_the_config
 from .drive_home import decide_commands
 from .field import field_geometry
 from .observation_layout import bounds_of, observation_keys
@@ -53,6 +54,7 @@ class BatchedMctf:
         ConfigError: the config is unusable.
     """
 
+    @checked_calls(hint=of_the_config)
     def __init__(self, config: GameConfig | str | None = None, n_games: int = 1, seed: int | None = None) -> None:
         self.config = as_config(config)
         self.n_games = check_count("n_games", n_games, low=1)

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 from gymnasium.spaces import Space
 from pettingzoo import ParallelEnv
+from steerclear.shield.calls import checked_calls
 from steerclear.shield.exceptions import ConfigError, GameError
 from steerclear.shield.jit import Array
 
 from .actions import ActionDecoder, action_kinds, action_space
 from .compat import PyquaticusAttributes
-from .config import GameConfig
+from .config import GameConfig, of_the_config
 from .core import BatchedMctf, CommandFilter
 from .field import field_points
 from .infos import InfoWriter
@@ -55,6 +56,7 @@ class MctfEnv(PyquaticusAttributes, ParallelEnv[str, np.ndarray, Any]):
 
     metadata = {"render_modes": list(RENDER_MODES), "name": "mctf_v0", "is_parallelizable": True, "render_fps": 10}  # noqa: RUF012 (PettingZoo's own form)
 
+    @checked_calls(hint=of_the_config)
     def __init__(
         self,
         config: GameConfig | str | None = None,

@@ -15,7 +15,7 @@ import numpy as np
 from steerclear import policies
 from steerclear.env.mctf import MctfEnv
 from steerclear.policies.protocol import TeamPolicy
-from steerclear.shield.barriers.registry import Barrier, get_barrier
+from steerclear.shield.barriers.registry import Barrier, get_barrier, takes_values
 from steerclear.shield.exceptions import ConfigError, SteerclearError
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import Platform, fresh_state, get_platform, step_boat
@@ -160,15 +160,19 @@ def _values(barrier: Barrier) -> Array:
         return barrier.now()
 
 
+def _asked(barrier: Barrier, function: Callable[..., Any], *given: Any) -> Any:
+    return function(*given) if takes_values(barrier.name, function) else function(*given[:-1])
+
+
 def _slope(barrier: Barrier, x: float, y: float, ahead_s: float, values: Array, where: str) -> tuple[float, float]:
     assert barrier.slope is not None
     with _foreign(f"the slope of barrier {barrier.name!r} is no pair of numbers {where}"):
-        along_x, along_y = (float(part) for part in barrier.slope(x, y, ahead_s, values))
+        along_x, along_y = (float(part) for part in _asked(barrier, barrier.slope, x, y, ahead_s, values))
     return along_x, along_y
 
 
 def _margin(barrier: Barrier, x: float, y: float, ahead_s: float, values: Array, where: str) -> float:
     with _foreign(f"barrier {barrier.name!r} raises {where}"):
-        margin = float(barrier.margin(x, y, ahead_s, values))
+        margin = float(_asked(barrier, barrier.margin, x, y, ahead_s, values))
     _hold(not math.isnan(margin), f"barrier {barrier.name!r} is no number {where}; give +inf far from what is kept")
     return margin

@@ -9,6 +9,7 @@ import numpy as np
 
 from . import workspace as W
 from .arrays import NoNumbersError, shaped, truths, whole_numbers
+from .calls import checked_calls
 from .config import ShieldConfig
 from .decide import Deciders
 from .exceptions import ConfigError, FleetError
@@ -19,6 +20,7 @@ from .masks import passing
 from .model import boats_of
 from .platforms import Platform
 from .platforms import layout as L
+from .renamed import takes_old_keywords
 from .shield import NOMINAL, barriers_of
 from .surroundings import OPEN_WATER, Surroundings
 
@@ -47,6 +49,7 @@ class BatchedShield:
         ConfigError: a setting that a batch does not support, or that is invalid.
     """
 
+    @checked_calls()
     def __init__(
         self,
         config: ShieldConfig,
@@ -112,6 +115,7 @@ class BatchedShield:
                 raise FleetError(f"mask is {which.dtype} of shape {which.shape}; give bool of shape ({games},)")
         self._deciders.forget(which)
 
+    @takes_old_keywords({"wanted": "nominal"})
     def decide(
         self,
         state: Array,

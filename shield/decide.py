@@ -42,6 +42,9 @@ from .workspace import Boats, Scene, Static, all_spent, new_scene, part_of, unch
 ROUNDING_S = 1e-9
 """Times this short are none: what is left of a sum of steps."""
 
+TINY_MPS = 1e-9
+"""A speed this little below 0 is 0: the rounding of a boat at rest."""
+
 HOLD_OVER = -1.0
 """Time left, s, of a hold that is over while the boat is still on its backup."""
 
@@ -126,6 +129,8 @@ def store_decision(b: int, scene: Scene) -> None:
         changed = not (passed or same)
         if changed:
             copy_row(sent, command[i])
+            if -TINY_MPS < sent[0] < 0.0:
+                sent[0] = 0.0
             turned = state[i, L.HEADING] - given[i, L.HEADING]
             if turned != 0.0:
                 sent[1] += turned

@@ -48,7 +48,8 @@ class Reason(IntEnum):
     RIGHT_OF_WAY = workspace.RIGHT_OF_WAY
     """Two teammates kept each other from turning: one turns away (gives way), one holds its course (stands on)."""
     LIMITED = workspace.LIMITED
-    """The nominal speed is beyond the platform's range; cut to that, the command leaves every boat its backup."""
+    """The nominal speed is beyond the platform's range; cut to that, the command leaves every boat its backup. In a
+    game the command stays as it is, and the game cuts it."""
     STOPPED = workspace.STOPPED
     """With "stop" in the settings (`ShieldConfig.beyond_then`): the boat is beyond the hard line, or would otherwise
     touch an obstacle. It is commanded to stop on its course, and its link is asked for its own stop."""

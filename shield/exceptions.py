@@ -7,6 +7,10 @@ class SteerclearError(Exception):
     """Base of all errors this package raises on purpose."""
 
 
+class CallError(SteerclearError, TypeError):
+    """A function or constructor was called with an unknown keyword, or without an argument that it needs."""
+
+
 class ConfigError(SteerclearError, ValueError):
     """A setting is unknown, misspelt or out of range."""
 

@@ -8,6 +8,8 @@ import warnings
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar, cast
 
+from .calls import explain
+
 SETTINGS = {
     "adversary_s": "adversary_horizon_s",
     "visitor_s": "intruder_horizon_s",
@@ -151,7 +153,10 @@ class Renamed(dict[str, Any]):
 
 
 def takes_old_keywords(keywords: Mapping[str, str]) -> Callable[[F], F]:
-    """Let a function be called with the old names of some keywords, old name to new; each use warns."""
+    """Let a function be called with the old names of some keywords, old name to new; each use warns.
+
+    Wrong arguments end in a `CallError`, as of `checked_calls`.
+    """
 
     def renaming(function: F) -> F:
         @functools.wraps(function)
@@ -160,7 +165,11 @@ def takes_old_keywords(keywords: Mapping[str, str]) -> Callable[[F], F]:
                 for old in [name for name in given if name in keywords]:
                     warn(old, keywords[old])
                     given[keywords[old]] = given.pop(old)
-            return function(*args, **given)
+            try:
+                return function(*args, **given)
+            except TypeError as error:
+                explain(error, function, args, given)
+                raise
 
         return cast(F, called)
 

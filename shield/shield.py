@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from copy import deepcopy
 from functools import lru_cache
@@ -88,6 +89,17 @@ class Shield:
         self._active = np.zeros(0, np.int64)  # active constraints in the fleet's order; negative indices are used, too
         self._autopilots: Autopilots | None = None
         self.serves: object | None = None
+
+    def __repr__(self) -> str:
+        """Return in one line what the shield keeps, and the boats that it has decided for since `reset`."""
+        config, field = self.config, self.surroundings.field
+        area = "" if field is None else f"; area ({', '.join(f'{edge:g}' for edge in field)}) m"
+        kinds = Counter((team, getattr(kind, "name", kind)) for _, kind, team in self._known[1]) if self._known else {}
+        boats = ", ".join(f"{count} {kind} of team {team}" for (team, kind), count in sorted(kinds.items()))
+        return (
+            f"<Shield: separation {config.separation_m:g} m, profile {config.profile}, a decision every "
+            f"{config.dt_s:g} s{area}; {boats or 'no boats yet'}>"
+        )
 
     @classmethod
     def for_game(cls, game: Any, **settings: Any) -> Shield:

@@ -14,6 +14,7 @@ import numpy as np
 
 from .arrays import NoNumbersError, numbers
 from .barriers.static import LEAVE_S
+from .calls import checked_calls
 from .config import ShieldConfig
 from .exceptions import ConfigError
 from .fleet import LARGEST
@@ -33,6 +34,7 @@ NOWHERE = np.array([-np.inf, -np.inf, np.inf, np.inf])
 OUTWARDS = np.array([-1.0, -1.0, 1.0, 1.0])
 
 
+@checked_calls()
 @dataclass(frozen=True)
 class Surroundings:
     """Static constraints, in m, east and north.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+from collections import deque
 from collections.abc import Callable
 
 import numpy as np
@@ -13,6 +14,7 @@ from steerclear.shield.fleet import Fleet
 from steerclear.shield.platforms import layout as L
 
 EVERY_S = 5.0  # time between two lines, s
+MOST_TICKS = 5000  # kept for the next line where a terminal takes none
 LINES = {
     "time": ("{:6.0f} s", f"seconds since the first turn; a line every {EVERY_S:g} s"),
     "alone": ("no other boat", "nobody else is known: nothing to keep clear of"),
@@ -97,20 +99,15 @@ class PlainLines:
 
     def __init__(self, say: Callable[[str], None], every_s: float = EVERY_S) -> None:
         self._say, self._every_s = say, every_s
-        self._tick: Tick | None = None
-        self._began_s = math.nan
-        self._tally = Tally()
+        self._ticks: deque[Tick] = deque(maxlen=MOST_TICKS)
         self._shown: set[tuple[str, str, str]] = set()
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._run, name="plain lines", daemon=True)
         self._thread.start()
 
     def take(self, tick: Tick) -> None:
-        """Use this tick for the next line."""
-        if self._tick is None:
-            self._began_s = tick.began_s
-        self._tick = tick
-        self._tally.take(tick)
+        """Keep this tick for the next line; the loop never waits for the thread that prints."""
+        self._ticks.append(tick)
 
     def close(self) -> None:
         """Stop the thread."""
@@ -118,17 +115,20 @@ class PlainLines:
         self._thread.join(2.0)
 
     def _run(self) -> None:
+        began_s = math.nan
         while not self._closing.wait(self._every_s):
-            tick = self._tick
-            if tick is None:
+            if not self._ticks:
                 continue
-            since, self._tally = self._tally, Tally()  # no lock: the loop must never wait for this thread
+            since = Tally()
+            while self._ticks:
+                since.take(tick := self._ticks.popleft())
+                began_s = tick.began_s if math.isnan(began_s) else began_s
             said = [_say("undecided")]
             if tick.fleet is not None and tick.decisions is not None:
                 near = _say("alone") if math.isinf(since.closest_m) else _say("closest", since.closest_m)
                 changed = _say("changed", since.changed, since.commands)
                 said = [near, changed, _say("policy", 1e3 * tick.policy_age_s)]
-            self._say(f"{_say('time', tick.began_s - self._began_s)}  {', '.join(said)}")
+            self._say(f"{_say('time', tick.began_s - began_s)}  {', '.join(said)}")
             new = {(action.subject, action.condition, action.response): action.text for action in tick.actions}
             for key, text in new.items():
                 if key not in self._shown or key[1] == "geofence":

@@ -19,7 +19,7 @@ from numba.extending import intrinsic
 
 from ..exceptions import ConfigError
 from ..foreign import plain_text
-from .registry import Barrier, Margin, Slope
+from .registry import Barrier, Margin, Slope, takes_values
 
 DIFFERENCE_M = 0.05
 """Half the distance of central differences where no gradient is given, m."""
@@ -60,7 +60,8 @@ def _made(barrier: Barrier) -> tuple[int, Any]:
     """Return the address of a barrier's compiled function, and the object that keeps it alive."""
     options: Any = {} if PLAIN else {"nogil": True, "error_model": "numpy", "boundscheck": True}
     compiled = (lambda function: function) if PLAIN else njit(**options)
-    function = _parts_of(compiled(barrier.margin), barrier.slope and compiled(barrier.slope), compiled)
+    margin, slope = (part and _with_values(barrier.name, part, compiled) for part in (barrier.margin, barrier.slope))
+    function = _parts_of(margin, slope, compiled)
     if PLAIN:
         return len(_MADE), function
 
@@ -69,6 +70,18 @@ def _made(barrier: Barrier) -> tuple[int, Any]:
 
     made = cfunc(_SIGNATURE)(part_of)
     return int(made.address or 0), made
+
+
+def _with_values(name: str, function: Any, compiled: Callable[[Any], Any]) -> Any:
+    """Return the compiled function; one without ``values`` gets them all the same and leaves them."""
+    inner = compiled(function)
+    if takes_values(name, function):
+        return inner
+
+    def leaving(x: float, y: float, ahead: float, values: Any) -> Any:
+        return inner(x, y, ahead)
+
+    return compiled(leaving)
 
 
 def _parts_of(margin: Any, slope: Any, compiled: Callable[[Any], Any]) -> Any:

@@ -2,37 +2,46 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
+import numpy as np
+
 from ..arrays import NoNumbersError, numbers
+from ..calls import checked_calls
 from ..exceptions import ConfigError
 from ..foreign import load_others
 from ..jit import Array
 from ..workspace import MOST_VALUES
 
+FORMS = "(x_m, y_m, ahead_s), or (x_m, y_m, ahead_s, values)"
+"""Arguments of the functions of a barrier."""
 GROUP = "steerclear.barriers"
 """Entry points of this group name barriers of other packages: a `Barrier`, a function that builds one, or a module that
 registers some."""
 
-Margin = Callable[[float, float, float, Array], float]
-Slope = Callable[[float, float, float, Array], tuple[float, float]]
+Margin = Callable[[float, float, float, Array], float] | Callable[[float, float, float], float]
+Pair = tuple[float, float]
+Slope = Callable[[float, float, float, Array], Pair] | Callable[[float, float, float], Pair]
 
 
+@checked_calls()
 @dataclass(frozen=True)
 class Barrier:
     """A function h of place and time that boats keep >= 0, such as the distance from a ferry's domain.
 
     Attributes:
         name: its name in `ShieldConfig.barriers`.
-        margin: h(x_m, y_m, ahead_s, values), m, of a boat's centre at x, y m east and north, ``ahead_s`` seconds from
-            now. It falls by at most 1 m per metre, as a distance does. Beyond 50 m it may be anything, such as +inf.
-        slope: (dh/dx, dh/dy), with the same arguments; None: central differences of the margin.
-        values: numbers passed to both as a float64 array, such as the ferry's position. Or a function that is called
-            before every decision and returns as many each time. Everything that changes must come through them: the
-            compiler takes whatever else a function reads as constant.
+        margin: h(x_m, y_m, ahead_s, values), or h(x_m, y_m, ahead_s), m, of a boat's centre at x, y m east and north,
+            ``ahead_s`` seconds from now. It falls by at most 1 m per metre, as a distance does. Beyond 50 m it may be
+            anything, such as +inf.
+        slope: (dh/dx, dh/dy), with or without ``values``; None: central differences of the margin.
+        values: a tuple of numbers, passed to both as a float64 array, such as a rock's position. Or a function that is
+            called before every decision and returns as many each time. Everything that changes must come through it:
+            the compiler takes whatever else a function reads as constant.
 
     Raises:
         ConfigError: the name is not an identifier, something is no function, or the values cannot be used.
@@ -47,8 +56,15 @@ class Barrier:
         if not isinstance(self.name, str) or not self.name.isidentifier():
             raise ConfigError(f"a barrier cannot be named {self.name!r}; give letters, digits and _")
         if not callable(self.margin) or not (self.slope is None or callable(self.slope)):
+            raise ConfigError(f"margin and slope of barrier {self.name!r} must be functions {FORMS}")
+        takers = [takes_values(self.name, part) for part in (self.margin, self.slope) if part is not None]
+        if not any(takers) and self.values != ():
+            raise ConfigError(f"barrier {self.name!r} has values that no function takes; add the argument values")
+        if isinstance(self.values, (list, np.ndarray)):
             raise ConfigError(
-                f"margin and slope of barrier {self.name!r} must be functions (x_m, y_m, ahead_s, values)"
+                f"values of barrier {self.name!r} are a {type(self.values).__name__}, and later changes to it would "
+                "count for nothing; give a function that is asked before every decision (values=lambda: mine), or a "
+                "tuple of what never changes"
             )
         if not callable(self.values):
             object.__setattr__(self, "values", tuple(self.now().tolist()))
@@ -67,6 +83,25 @@ class Barrier:
         if found.ndim != 1 or len(found) > MOST_VALUES or not all(map(math.isfinite, found)):
             raise ConfigError(f"values of barrier {self.name!r}: give at most {MOST_VALUES} finite numbers in a row")
         return found
+
+
+def takes_values(name: str, function: Callable[..., object]) -> bool:
+    """Return whether a function of a barrier takes ``values`` after x, y and the time.
+
+    Raises:
+        ConfigError: it takes neither three nor four arguments.
+    """
+    try:
+        signature = inspect.signature(getattr(function, "py_func", function))  # of a compiled function: its source
+    except (TypeError, ValueError):
+        return True  # the compiler will say
+    for count in (4, 3):
+        try:
+            signature.bind(*range(count))
+        except TypeError:
+            continue
+        return count == 4
+    raise ConfigError(f"a function of barrier {name!r} takes {signature}; define it with {FORMS}")
 
 
 Given = TypeVar("Given", bound="Barrier | Callable[[], Barrier]")

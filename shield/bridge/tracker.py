@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import logging
 import math
+import re
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 
@@ -25,6 +26,8 @@ from .messages import NEVER_S, Alarm, BoatReading, Contact, Sent
 LOG = logging.getLogger(__name__)
 TALK_EVERY_S, MOST_LOGGED = 5.0, 256
 """Interval between logs of the same fault of a boat, s; faults remembered (a feed may send any number of names)."""
+_NUMBER = re.compile(r"-?\d[\d.e+-]*")
+"""What differs between two texts of the same fault."""
 GHOST = "~"  # a ghost is named after its boat, plus this and a number; no boat name in a fleet file contains it
 FARTHEST_M = 1e5  # positions farther from the field's corner are faults
 SPEED_SHARE, SPEED_MORE_MPS = 2.0, 1.0
@@ -410,7 +413,7 @@ class Tracker:
 
     def _note(self, name: str, text: str) -> None:
         self.faults[name] = text
-        self._log(name, text.split()[0], f"fix refused: {text}")
+        self._log(name, _NUMBER.sub("", text), f"fix refused: {text}")
 
     def _log(self, name: str, what: str, text: str) -> None:
         if len(self._logged_s) > MOST_LOGGED:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import ctypes
 import logging
 import warnings
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -40,6 +41,10 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "scs": {"eps_abs": 1e-7, "eps_rel": 1e-7},
 }
 """Settings with which a backend meets `ROW_TOLERANCE`; other backends meet it with their defaults."""
+
+
+_FAILURES: Counter[str] = Counter()
+"""How often each backend raised, in this process."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +106,10 @@ def solve(program: Program, solver: str) -> Array | None:
     except (qpsolvers.exceptions.QPError, ValueError, ArithmeticError):
         return None
     except Exception as error:  # foreign code may raise anything; the backups remain
-        logger.warning("QP solver %s failed (%s: %s)", solver, type(error).__name__, error)
+        _FAILURES[solver] += 1
+        count, why = _FAILURES[solver], type(error).__name__
+        if count & (count - 1) == 0:  # the 1st, 2nd, 4th, 8th ...
+            logger.warning("QP solver %s failed (%s: %s), %d times so far; backups stand in", solver, why, error, count)
         return None
     if not isinstance(answer, np.ndarray) or answer.shape != program.z0.shape or answer.dtype != np.float64:
         return None

@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from ..commands import Commands
+from ..commands import ROUNDING_MPS, Commands
 from ..config import ShieldConfig
-from ..decision import Decisions
+from ..decision import Decisions, Reason
 from ..exceptions import ConfigError
 from ..fleet import Fleet
 from ..jit import Array
+from ..platforms import get_platform
 from ..shield import Shield
 from ..surroundings import Surroundings
 from . import mctf, pyquaticus  # noqa: F401 (they register their readers)
@@ -161,7 +162,17 @@ class ShieldedGame:
         """Decide on commands (n, 2) of all boats: speed m/s, relative heading deg."""
         fleet, around = self.seen()
         decisions: Decisions = self.shield.decide(fleet, Commands.game_deg(commands), around)
+        if isinstance(self.shield, Shield):
+            _say_limited(decisions)
         return decisions
+
+
+def _say_limited(decisions: Decisions) -> None:
+    """Tell speeds beyond a platform's range as `Shield.decide` does elsewhere; here the game cuts them itself."""
+    speed_mps, fleet = decisions.nominal.values[:, 0], decisions.fleet
+    highest_mps = np.array([get_platform(kind).max_speed_mps for kind in fleet.platforms])
+    beyond = (speed_mps > highest_mps + ROUNDING_MPS) | (speed_mps < -ROUNDING_MPS)
+    decisions.reason[beyond & (decisions.reason == Reason.PASSED)] = Reason.LIMITED
 
 
 def layers_of(env: Any) -> Iterator[Any]:

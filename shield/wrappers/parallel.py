@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -17,7 +19,8 @@ from .actions import DISCRETE
 from .checks import SIDES, ShieldedGame, layers_of, one_game_shield, team_number, words_of
 from .readers import GameReader, reader_of
 
-_OWN = ("env", "masks", "decisions", "_game")
+logger = logging.getLogger(__name__)
+_OWN = ("env", "masks", "decisions", "_game", "_own", "_said", "_forgotten")
 """Attributes of the wrapper itself."""
 
 
@@ -68,6 +71,9 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         _check_not_shielded(env, number, one_game_shield(shield))
         self._game = ShieldedGame(shield, found, number, shield_autopilot, keep_out)
         self.masks = masks
+        self._own = {agent for agent, of in zip(found.agent_ids, found.facts().team, strict=True) if of == number}
+        self._said: set[str] = set()
+        self._forgotten = np.zeros(len(found.agent_ids), np.bool_)
         self.decisions: Decisions | None = None
 
     @property
@@ -96,6 +102,7 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         """
         self._game.begin()
         self.decisions = None
+        self._said.clear()
         observations, infos = self.env.reset(seed=seed, options=options)
         self._mask(infos)
         return observations, infos
@@ -107,6 +114,7 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
             ConfigError: the env's settings have changed since its reset, or the shield has begun to serve someone else.
         """
         self._game.check()
+        self._note_forgotten(actions)
         with self.reader.filtering(self._safe):
             outcome = self.env.step(actions)
         infos = outcome[-1]
@@ -127,9 +135,22 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         return getattr(self.env if not name.startswith("_") else self.env.unwrapped, name)
 
     def _safe(self, commands: Array) -> Array:
-        """Return the filtered commands (n, 2) for nominal ones."""
+        """Return the filtered commands (n, 2) for nominal ones; a boat without an action of its own is held."""
+        forgotten = self._forgotten & ~np.asarray(commands).any(axis=1)  # boats that the game drives have its commands
+        if forgotten.any():
+            commands = np.where(forgotten[:, None], np.nan, commands)
         self.decisions = self._game.decide(commands)
-        return self.decisions.filtered.values
+        sent = self.decisions.filtered.values
+        return np.where(np.isnan(sent), 0.0, sent) if forgotten.any() else sent  # nan: of those it does not decide for
+
+    def _note_forgotten(self, actions: Any) -> None:
+        """Note the team's boats without an action, and log each once a game."""
+        if not isinstance(actions, Mapping):  # which the env refuses
+            return
+        self._forgotten = np.array([agent in self._own and agent not in actions for agent in self.reader.agent_ids])
+        for agent in sorted(self._own - actions.keys() - self._said):
+            self._said.add(agent)
+            logger.warning("no action for %s; boats without an action hold", agent)
 
     def _covered(self, team: Any, infos: Any) -> list[tuple[int, str]]:
         """Return numbers and ids of the shielded team's boats that have infos."""

@@ -12,7 +12,7 @@ from steerclear.env.compat import Team, TeamMap
 from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
 from steerclear.shield import Shield
-from steerclear.shield.exceptions import ConfigError, GameError
+from steerclear.shield.exceptions import CallError, ConfigError, GameError
 from steerclear.shield.wrappers import ShieldedParallelEnv
 
 SMALL = GameConfig.preset("aamas2024", team_size=1, max_time_s=1.0)
@@ -69,6 +69,13 @@ def test_unknown_reset_options_are_reported_and_near_misses_refused(caplog):
 def test_bad_arguments_are_refused():
     with pytest.raises(ConfigError, match="unknown render_mode 'ascii'; choose one of human, rgb_array"):
         MctfEnv(SMALL, render_mode="ascii")
+    words = (
+        r"MctfEnv has no max_time_s=; it is a setting of the game: give GameConfig.preset\(name, max_time_s=\.\.\.\)"
+    )
+    with pytest.raises(CallError, match=words):
+        MctfEnv(max_time_s=60.0)
+    with pytest.raises(CallError, match="MctfEnv has no rendermode=; did you mean render_mode="):
+        MctfEnv(rendermode="human")
     with pytest.raises(ConfigError, match="unknown preset"):
         MctfEnv("aamas2042")
 

@@ -8,7 +8,9 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 from steerclear.shield import Commands, Fleet, Shield, ShieldConfig, Surroundings
-from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.batch import BatchedShield
+from steerclear.shield.exceptions import CallError, ConfigError
+from steerclear.shield.platforms import fresh_state
 from steerclear.shield.renamed import DECISION, DECISIONS, PROFILES, SETTINGS, current_settings
 
 RANGES = {entry.name: entry.metadata["range"] for entry in fields(ShieldConfig) if "range" in entry.metadata}
@@ -154,3 +156,43 @@ def test_decide_takes_nominal_commands_by_their_old_name_too_and_warns():
     assert (old.filtered.values == Shield().decide(fleet, commands).filtered.values).all()
     with pytest.raises(TypeError, match="nominal"):
         Shield().decide(fleet)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: Fleet.of(heading=[0.0]), "Fleet.of has no heading=; did you mean heading_rad= or heading_deg=?"),
+        (lambda: Fleet.of(speed_mps=[1.0]), "Fleet.of was called without position_m, team, platforms; it takes"),
+        (lambda: Shield().decide(None), "Shield.decide was called without nominal; it takes fleet, nominal, surround"),
+        (lambda: Shield().decide(None, None, None, 4), r"got 4 arguments without a name and takes \(fleet, nominal"),
+        (lambda: Surroundings(polygon=()), "Surroundings has no polygon=; did you mean polygons=?"),
+        (lambda: ShieldConfig(separation=3.0), "ShieldConfig has no separation=; did you mean separation_m="),
+        (lambda: BatchedShield(ShieldConfig(), game=3), "BatchedShield has no game=; did you mean games="),
+    ],
+)
+def test_a_call_with_wrong_arguments_names_the_right_ones(call, words):
+    with pytest.raises(CallError, match=words.replace("?", r"\?")):
+        call()
+    assert issubclass(CallError, TypeError)
+
+
+def test_a_shield_says_in_one_line_what_it_keeps_and_for_whom():
+    shield = Shield(separation_m=4.0, surroundings=Surroundings(field=(0.0, 0.0, 160.0, 80.0)))
+    kept = "<Shield: separation 4 m, profile competitive, a decision every 0.1 s; area (0, 0, 160, 80) m; "
+    assert repr(shield) == kept + "no boats yet>"
+    fleet = Fleet.of(
+        position_m=[[20, 20], [80, 40], [90, 60]],
+        heading_rad=[0.0] * 3,
+        speed_mps=[1.0] * 3,
+        team=[0, 0, 1],
+        platforms=["heron", "heron", "surveyor"],
+    )
+    shield.decide(fleet, Commands.absolute_rad([[1.0, 0.0]] * 3))
+    assert repr(shield) == kept + "2 heron of team 0, 1 surveyor of team 1>"
+
+
+def test_a_batch_takes_nominal_commands_by_their_old_name_too_and_warns():
+    shield = BatchedShield(ShieldConfig(), 1, ("heron",), (0,))
+    state, nominal = fresh_state(0.0, 0.0, 0.0)[None, None], np.array([[[1.0, 0.0]]])
+    with pytest.warns(DeprecationWarning, match="'wanted' is now 'nominal'"):
+        assert (shield.decide(state, wanted=nominal, ours=np.ones((1, 1), bool)) == nominal).all()

@@ -63,6 +63,19 @@ def test_a_boat_alone_has_no_closest_approach(ticks):
     assert rows["turn began late, 999 of 1000 within"] == "3456.0 ms"
 
 
+def test_every_tick_is_counted_in_one_line_and_no_line_tells_of_none(ticks):
+    lines, own = [], int(ticks[0].fleet.controlled.sum())
+    sink = PlainLines(lines.append, every_s=0.01)
+    for _ in range(400):
+        sink.take(ticks[0])
+        time.sleep(0.0005)
+    time.sleep(0.1)
+    sink.close()
+    counted = [int(line.split(" of ")[1].split()[0]) for line in lines if " of " in line]
+    assert sum(counted) == 400 * own
+    assert all(counted)
+
+
 def test_what_lasts_is_said_once_whatever_its_figures_and_again_when_its_response_changes(ticks):
     lines = []
     sink = PlainLines(lines.append, every_s=0.05)

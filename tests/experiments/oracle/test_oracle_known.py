@@ -5,11 +5,19 @@ import math
 import numpy as np
 import pytest
 from oracle_runs import DT_S, driven_track, first_violation, straight_track
+from steerclear.experiments import oracle
 from steerclear.experiments.oracle import Outcome, judge
 from steerclear.shield.platforms import Platform, fresh_state
 from steerclear.shield.platforms.proving import reference_models
 
 RADIUS_M = 2.5
+
+
+def test_earlier_names_warn_in_the_words_of_all_others():
+    with pytest.warns(DeprecationWarning, match="'judge_breach' is now 'judge_violation'; the old name goes with"):
+        assert oracle.judge_breach is oracle.judge_violation
+    with pytest.raises(AttributeError, match="has no attribute 'judge_brech'"):
+        oracle.judge_brech  # noqa: B018
 
 
 def model(*settings, **more):

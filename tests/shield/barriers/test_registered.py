@@ -18,7 +18,7 @@ from steerclear.experiments.entries.wrap import game_spec
 from steerclear.shield import Commands, Fleet, Reason, Shield, ShieldConfig, Surroundings, arrays
 from steerclear.shield.backup.paths import SAG_M
 from steerclear.shield.barriers import Barrier, register_barrier, registry
-from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.exceptions import ConfigError, SteerclearError
 
 FERRY = (0.0, 45.0, 0.0, -1.5, 10.0)
 """Place, m, velocity, m/s, and radius of its domain, m: it comes straight at a boat that runs north from the origin."""
@@ -84,6 +84,37 @@ def test_a_barrier_counts_as_an_obstacle_of_the_same_place_does():
     stopped = sail(Shield(surroundings=Surroundings(stops=((1.0, 20.0, 4.0 + SAG_M),))), lone(), north, 250)
     assert (stopped.reason != Reason.PASSED).any()
     assert np.allclose(round_it.position, stopped.position, atol=1e-6)
+
+
+def test_a_function_without_values_is_a_barrier_too():
+    """Of the place alone: every command is that of the same function with an argument it does not use."""
+    runs = []
+    for margin in (lambda x, y, ahead: 20.0 - y, lambda x, y, ahead, values: 20.0 - y):
+        registry.BARRIERS.clear()
+        register_barrier(Barrier("shore", margin, lambda x, y, ahead: (0.0, -1.0)))
+        check_barrier("shore")
+        runs.append(sail(Shield(barriers=("shore",)), lone(), north, 150).position)
+    assert runs[0].tobytes() == runs[1].tobytes()
+    assert 15.0 < runs[0][..., 1].max() <= 20.0
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"margin": lambda x, y: y}, r"takes \(x, y\); define it with \(x_m, y_m, ahead_s\), or"),
+        (
+            {"margin": ferrys, "values": [5.0]},
+            r"are a list, and later changes to it would count for nothing; give a",
+        ),
+        ({"margin": ferrys, "values": np.ones(5)}, "are a ndarray, and later changes"),
+        ({"margin": lambda x, y, ahead: y, "values": (1.0,)}, "has values that no function takes"),
+        ({"values": (1.0,)}, "Barrier was called without margin; it takes name, margin, slope, values"),
+        ({"margin": ferrys, "value": (1.0,)}, "Barrier has no value=; did you mean values=?"),
+    ],
+)
+def test_a_barrier_that_cannot_be_asked_is_refused_with_the_remedy(given, words):
+    with pytest.raises(SteerclearError, match=words):
+        Barrier("mine", **given)
 
 
 @pytest.mark.parametrize("settings", [{}, {"current_mps": 0.2, "delay_s": 0.2}])

@@ -39,6 +39,18 @@ def test_the_fleet_is_in_the_files_order_with_ages_and_errors():
     assert np.isnan(fleet.state[1, L.THRUST])
 
 
+def test_each_fault_of_a_boat_is_logged_and_the_same_one_with_other_figures_seldom(caplog):
+    """The texts of two faults may begin with one word."""
+    tracker = tracker_with(contact())
+    for k, x in enumerate((2e5, 2.1e5, 60.0, 61.0)):
+        at = 100.1 + 0.01 * k
+        tracker.update(at, {}, [contact(x=x, fixed_s=at)])
+    told = [record.message for record in caplog.records]
+    assert len(told) == 2, told
+    assert "nowhere near" in told[0]
+    assert "jumped" in told[1]
+
+
 def test_a_boat_never_seen_is_left_out_and_one_once_seen_stays():
     tracker = tracker_with()
     assert tracker.assemble({"blue_1"}).names == ("blue_1",)

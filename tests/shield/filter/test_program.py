@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import qpsolvers
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from steerclear.shield import ShieldConfig
+from steerclear.shield.filter import program as backend
 from steerclear.shield.filter.program import ROW_TOLERANCE, Program, solve
 from steerclear.shield.filter.qp import project
 
@@ -122,6 +124,18 @@ def test_a_backend_that_raises_has_no_answer_and_an_interrupt_is_not_swallowed(m
     failure = KeyboardInterrupt()
     with pytest.raises(KeyboardInterrupt):
         solve(program(), "daqp")
+
+
+def test_a_backend_that_fails_at_each_decision_is_logged_seldom_and_counted(monkeypatch, caplog):
+    def explode(*_, **__):
+        raise RuntimeError("boom")
+
+    monkeypatch.setattr(qpsolvers, "solve_qp", explode)
+    monkeypatch.setattr(backend, "_FAILURES", Counter())
+    for _ in range(100):
+        assert solve(program(), "daqp") is None
+    assert len(caplog.records) == 7
+    assert caplog.messages[-1] == "QP solver daqp failed (RuntimeError: boom), 64 times so far; backups stand in"
 
 
 many = settings(max_examples=250, deadline=None, derandomize=True)

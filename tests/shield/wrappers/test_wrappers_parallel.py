@@ -65,6 +65,31 @@ def test_what_is_safe_passes_bit_for_bit():
     assert shielded.decisions[0].reason == Reason.PASSED
 
 
+def test_a_forgotten_boat_is_held_and_said_once_a_game(caplog):
+    env, options = duel(35.0)
+    env = ShieldedParallelEnv(env, Shield())
+    env.reset(seed=0, options=options)
+    for _ in range(3):
+        env.step({"agent_1": STRAIGHT})
+        assert env.decisions["agent_0"].reason == Reason.HELD
+    assert [record.message for record in caplog.records] == ["no action for agent_0; boats without an action hold"]
+    env.step(dict.fromkeys(env.agents, STRAIGHT))
+    assert env.decisions["agent_0"].reason == Reason.PASSED
+    env.reset(seed=0, options=options | {"init_dict": options["init_dict"] | {"agent_is_tagged": [1, 0]}})
+    env.step({})
+    assert env.decisions["agent_0"].reason == Reason.PASSED, "the game drives it"
+
+
+def test_a_speed_beyond_the_boat_is_limited_as_it_is_without_a_game():
+    env, options = duel(35.0)
+    env = ShieldedParallelEnv(env, Shield())
+    env.reset(seed=0, options=options)
+    env.step({"agent_0": (500.0, 0.0), "agent_1": STRAIGHT})
+    assert env.decisions["agent_0"].reason == Reason.LIMITED
+    assert env.decisions["agent_0"].filtered_speed_mps == 500.0, "the game cuts it"
+    assert not env.decisions["agent_0"].intervened
+
+
 @pytest.mark.parametrize("autopilot", [True, False])
 def test_boats_the_game_drives_are_covered_only_when_asked(autopilot):
     env, options = duel(35.0)

@@ -142,7 +142,8 @@ def test_a_function_that_fails_holds_the_boats(answer, caplog):
     assert np.isfinite(sent.values[0]).all()
     assert sent.values[0, 0] == 0.0
     assert caplog.messages
-    assert ("broken" in caplog.text) == (answer is ValueError)
+    assert ("ValueError: broken" in caplog.text) == (answer is ValueError)
+    assert (f"({__file__}:" in caplog.text) == (answer is ValueError), "where the function failed"
 
 
 def test_a_command_that_is_not_finite_holds_its_boat_and_the_log_says_whose(caplog):
