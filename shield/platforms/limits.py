@@ -112,14 +112,16 @@ def _turn_rate(platform: Platform, dt_s: float) -> float:
     """Return the highest turn rate, deg/s.
 
     In a turn the speed controller adds thrust for the lost speed, which also makes the boat turn faster. A boat that
-    needs way to turn is granted the most thrust and the highest speed at once: it may have both after a zig-zag.
+    needs way to turn is granted the most thrust and the highest speed at once: it may have both after a zig-zag. What a
+    boat turns always adds to a turn to the same side.
     """
     if platform.kind == "rate":
         return max(platform.max_turn_rate_at(0.0), platform.max_turn_rate_at(platform.max_speed_mps))
     if platform.full_turn_speed_mps > 0.0:
         full = float(turn_of_rudder(platform.pack(), platform.max_thrust, min(platform.max_rudder, 100.0), 1.0))
-        return full * platform.way_share(platform.newest_mps(dt_s))
-    return round(max(_turns(platform, dt_s, True)) / dt_s, 9)
+        return full * platform.way_share(platform.newest_mps(dt_s)) + abs(platform.rotate_speed_dps)
+    drift_dps = platform.rotate_speed_dps if platform.kind == "usv" else 0.0
+    return round(max(_turns(platform, dt_s, True)) / dt_s - drift_dps + abs(drift_dps), 9)
 
 
 def _turns(platform: Platform, dt_s: float, any_rudder: bool) -> Iterator[float]:

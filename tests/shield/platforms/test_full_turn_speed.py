@@ -122,6 +122,17 @@ def test_no_commands_turn_a_boat_faster_than_its_limit(boat, seed):
         assert apart_deg(row[L.HEADING], before) / DT_S <= most * (1.0 + 1e-9)
 
 
+@pytest.mark.parametrize("drift_dps", [-10.0, 10.0])
+@pytest.mark.parametrize("boat", [HERON, replace(NEEDS_WAY, full_turn_speed_mps=2.0)])
+def test_the_turn_that_is_always_there_adds_to_the_limit_on_either_side(boat, drift_dps):
+    platform = replace(boat, rotate_speed_dps=drift_dps)
+    assert limits_of(platform).turn_rate_dps == pytest.approx(limits_of(boat).turn_rate_dps + 10.0)
+    params, row = cruise(platform)
+    before = row[L.HEADING]
+    step_boat(params, row, 2.0, math.copysign(179.0, drift_dps), DT_S)
+    assert apart_deg(row[L.HEADING], before) / DT_S <= limits_of(platform).turn_rate_dps * (1.0 + 1e-9)
+
+
 def test_the_limits_are_what_the_boat_does():
     params, row = cruise(NEEDS_WAY)
     limits, turned, steps = limits_of(NEEDS_WAY), 0.0, 0
