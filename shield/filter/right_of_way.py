@@ -49,7 +49,7 @@ GOES_ROUND = 2.0
 ROUND_DEG = 95.0
 """Course round another boat, from its bearing to starboard: a little outward, so that the distance does not shrink."""
 ON_COURSE_DEG = 10.0
-"""A boat that goes round another turns where it lies until its course is as near as this."""
+"""A boat that goes round another, and need not go to steer, turns where it lies until its course is as near as this."""
 
 
 @lean_kernel
@@ -94,6 +94,13 @@ def _stands_on(i: int, j: int, state: Array) -> bool:
 def _stands(i: int, speed_mps: float, scene: Scene) -> bool:
     """Return whether boat i lies still although it wants to go somewhere."""
     return speed_mps > STILL_MPS and abs(scene.state[i, L.SPEED]) <= STILL_MPS
+
+
+@lean_kernel
+def _needs_way(params: Array) -> bool:
+    """Return whether a boat has to go to steer."""
+    kind = params[L.KIND]
+    return kind == L.KIND_USV or (kind == L.KIND_RATE and params[L.TURN_AT_REST] == 0.0)
 
 
 @lean_kernel
@@ -186,7 +193,7 @@ def apply_right_of_way(i: int, scene: Scene) -> None:
         j = int(memory[i, W.BLOCKED_BY])
         bearing = math.atan2(state[j, L.X] - state[i, L.X], state[j, L.Y] - state[i, L.Y])
         scene.command[i, 1] = wrap_degrees(math.degrees(bearing) + ROUND_DEG - state[i, L.HEADING])
-        if abs(scene.command[i, 1]) > ON_COURSE_DEG:
+        if abs(scene.command[i, 1]) > ON_COURSE_DEG and not _needs_way(scene.boats.params[i]):
             scene.command[i, 0] = 0.0
     else:
         scene.command[i, 1] = AWAY_DEG * memory[i, W.GIVES_WAY]

@@ -216,3 +216,12 @@ def test_boats_that_stand_before_each_other_and_cannot_talk_go_round_each_other(
     run = sail(Shield(ShieldConfig(coordination="per_boat")), fleet, wanted, 600)
     assert (nearest_m < ARRIVED_M).all()
     assert run.closest(np.ones(3, bool)) >= 2.5
+
+
+@pytest.mark.parametrize("platform", ["heron", "heron_v22"])
+def test_a_boat_that_needs_way_is_not_told_to_turn_where_it_lies(platform):
+    """It would lie still for 20 s at a time, and be said to give way."""
+    fleet = fleet_of([(0.0, 0.0, 0.0, 0.0), (0.0, 2.6, 180.0, 0.0)], [0, 0], platform)
+    run = sail(Shield(), fleet, on_course([0.0, 180.0], 2.0), 150)
+    assert (run.sent[..., 0][run.reason == Reason.RIGHT_OF_WAY] > 0.0).all()
+    assert run.closest(np.ones(2, bool)) >= 2.5
