@@ -34,6 +34,7 @@ from .feed_packets import (
 )
 from .frame import FieldFrame
 from .mavlink.signing import NEW_STREAM_S, TICKS_PER_S, SigningClock
+from .mavlink.transport import place_text
 from .messages import TELEMETRY, Alarm, Closing, Contact
 
 LOG = logging.getLogger(__name__)
@@ -127,7 +128,7 @@ class FeedReceiver(Closing):
         self._closing, self._closed = threading.Event(), False
         self._socket = _hearing_socket(listen)
         host, port = self._socket.getsockname()[:2]
-        self.address = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+        self.address = place_text(host, port)
         self._thread = threading.Thread(target=self._hear, name="feed", daemon=True)
         self._thread.start()
 

@@ -261,6 +261,15 @@ def test_of_many_processes_one_says_that_code_is_compiled(capfd, monkeypatch):
     assert said.count("is its own") == 8
 
 
+def test_where_there_are_no_semaphores_who_says_that_code_is_compiled_gets_no_error(monkeypatch, caplog):
+    def none():
+        raise OSError("no semaphores")
+
+    monkeypatch.setattr(workers, "_first_word", none)
+    workers.LOG.warning("steerclear %s, once", workers.COMPILES)
+    assert workers.COMPILES in caplog.text
+
+
 @pytest.fixture
 def heeded():
     """Signals are heeded, also where a shell started the tests in the background."""

@@ -44,7 +44,7 @@ class Address:
     number: int  # port, or baud rate
 
     def __str__(self) -> str:
-        return f"{self.kind}:{self.host}:{self.number}"
+        return f"{self.kind}:{place_text(self.host, self.number)}"
 
 
 def parse_address(text: str) -> Address:
@@ -82,6 +82,11 @@ def host_and_port(text: str) -> tuple[str, int] | None:
         except ValueError:
             return None
     return host, int(found["port"])
+
+
+def place_text(host: str, number: int) -> str:
+    """HOST:PORT as `host_and_port` reads it."""
+    return f"[{host}]:{number}" if ":" in host else f"{host}:{number}"
 
 
 class Wire:

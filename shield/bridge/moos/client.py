@@ -17,6 +17,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from ..clock import Clock
+from ..mavlink.transport import place_text
 from .wire import (
     NOTIFY,
     POISON,
@@ -89,7 +90,7 @@ class MoosClient:
         hear: Callable[[Message, float], None],
         lost: Callable[[], None] = lambda: None,
     ) -> None:
-        self.name, self.address = name, f"{host}:{port}"
+        self.name, self.address = name, place_text(host, port)
         self._place, self._clock = (host, port), clock
         self.warp, self.ahead_s = float(getattr(clock, "speed", 1.0)), math.nan
         self._variables, self._hear, self._lost = tuple(variables), hear, lost

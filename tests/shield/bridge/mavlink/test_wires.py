@@ -56,6 +56,7 @@ def dialled():
 )
 def test_addresses_that_are(text, address):
     assert parse_address(text) == address
+    assert parse_address(str(address)) == address, "what errors name can be given"
 
 
 @pytest.mark.parametrize(
