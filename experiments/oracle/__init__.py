@@ -22,7 +22,8 @@ Usage (all arrays are float64)::
   ``verdict.plan`` (the avoiding commands), ``both.responsible`` (`Responsible`).
 """
 
-from steerclear.shield.renamed import old_names
+from typing import Any
+from warnings import warn
 
 from .boat_model import N_STATE, Boat
 from .judge import judge, judge_violation, judge_violations
@@ -51,4 +52,8 @@ _OLD = {
 }
 
 
-__getattr__ = old_names(globals(), _OLD)
+def __getattr__(name: str) -> Any:
+    if name not in _OLD:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    warn(f"{name!r} is now {_OLD[name]!r}; the old name goes with the next release", DeprecationWarning, stacklevel=2)
+    return globals()[_OLD[name]]

@@ -199,8 +199,8 @@ def test_boats_without_an_action_stop_and_unknown_ones_are_refused(make):
     env = ShieldedParallelEnv(make(), Shield())
     env.reset(seed=0)
     env.step({})
-    assert env.decisions[0].nominal_speed_mps == 0.0
-    assert env.decisions[0].reason == Reason.PASSED
+    assert env.decisions[0].filtered_speed_mps == 0.0
+    assert env.decisions[0].reason == Reason.HELD
     with pytest.raises(SteerclearError, match=r"unknown agent 'agent_7' in the actions; agents are agent_0, agent_1"):
         env.step({"agent_7": 4})
     with pytest.raises(SteerclearError, match="actions are a list; give a dict of agent id -> action"):
