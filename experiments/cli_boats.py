@@ -24,7 +24,7 @@ from steerclear.shield.bridge.fleet_file import FleetFile, load_fleet
 from steerclear.shield.bridge.messages import TickSink
 from steerclear.shield.bridge.moos.links import POLICY as MOOS_POLICY
 from steerclear.shield.bridge.operator import Operator
-from steerclear.shield.bridge.preflight_checks import CheckResult, not_passed
+from steerclear.shield.bridge.preflight_checks import SITUATION, CheckResult, not_passed
 from steerclear.shield.exceptions import ConfigError
 
 from . import cli_options as o
@@ -49,6 +49,8 @@ from .sim_boats.demo import demo_fleet, demo_text
 DEMO_WAIT_S = 300.0
 """Simulated boats may have to be compiled first."""
 STOPPED = "interrupted; boats were stopped as said above"
+GRAVE = {*SITUATION, "autopilot", "commanders", "fence"}
+"""Kinds of checks without which boats are not safe: no line invites to accept them."""
 Fleet = Annotated[Path, typer.Argument(metavar="FLEET.yaml", help="The runner's own file.", show_default=False)]
 WithParent = Annotated[
     bool, o.flag("End when standard input is closed: for programs that start this one.", "--with-parent")
@@ -120,10 +122,18 @@ def show_outcome(outcome: Outcome) -> None:
     """What boats were left doing and where the logs are; why nothing was begun."""
     say(*outcome.left)
     if outcome.refused:
-        names = " ".join(f"--accept {result.name}" for result in outcome.refused)
-        say(f"not started: {len(outcome.refused)} checks do not pass. Put them right, or go on with {names}")
+        names = [result.name for result in outcome.refused]
+        light = [name for name in names if name.partition(":")[0] not in GRAVE]
+        grave = [name for name in names if name not in light]
+        say(f"not started: {len(names)} checks do not pass")
+        if grave:
+            say(f"put right, boats are not safe without: {', '.join(grave)}")
+        if light:
+            say(f"put right, or accept: {' '.join(f'--accept {name}' for name in light)}")
     if outcome.log is not None:
         say(outcome.log)
+    if outcome.missing:
+        warn(outcome.missing)
 
 
 def _write(file: Path | None, name: str, orders: Orders, outcome: Outcome, started_s: float) -> None:

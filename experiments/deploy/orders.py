@@ -177,6 +177,7 @@ class Outcome:
     left: tuple[str, ...] = ()  # what each boat was left doing, and who was approaching it
     near: tuple[str, ...] = ()  # boats approaching one of the own boats at the end
     log: Path | None = None  # path of the black box; None if it never began
+    missing: str = ""  # what the black box lacks; empty: nothing
     figures: dict[str, float] = field(default_factory=dict)  # of the loop and its decisions
 
 

@@ -8,7 +8,8 @@ from collections import deque
 from collections.abc import Callable
 
 import numpy as np
-from steerclear.shield.bridge.messages import Tick
+from steerclear.shield.bridge.failsafe_table import CONDITIONS
+from steerclear.shield.bridge.messages import Action, Tick
 from steerclear.shield.decision import Reason
 from steerclear.shield.fleet import Fleet
 from steerclear.shield.platforms import layout as L
@@ -30,7 +31,7 @@ LINES = {
     "undecided": ("no decision", "no boat of ours is ready: each one's line or the checks say why"),
     "effect": (
         "  {}",
-        "a response in effect and why; once, and of a boat outside the operating area every time",
+        "why a response is due, which, how control returns; once, and of a boat outside the operating area every time",
     ),
 }
 """Text of the lines, and what they mean and what to do; the operator's page is made from it."""
@@ -129,11 +130,18 @@ class PlainLines:
                 changed = _say("changed", since.changed, since.commands)
                 said = [near, changed, _say("policy", 1e3 * tick.policy_age_s)]
             self._say(f"{_say('time', tick.began_s - began_s)}  {', '.join(said)}")
-            new = {(action.subject, action.condition, action.response): action.text for action in tick.actions}
+            new = {(one.subject, one.condition, one.response): _effect(one) for one in tick.actions}
             for key, text in new.items():
                 if key not in self._shown or key[1] == "geofence":
                     self._say(_say("effect", text))
             self._shown = set(new)
+
+
+def _effect(action: Action) -> str:
+    """Why a response is in effect, what is done, and how control returns, where the condition alone tells."""
+    returns = {row.returns for row in CONDITIONS.values() if row.name.partition(".")[0] == action.condition}
+    done = "" if action.response == "none" else f" -> {action.response}"
+    return action.text + done + (f"; control returns: {returns.pop()}" if done and len(returns) == 1 else "")
 
 
 def _say(name: str, *values: object) -> str:

@@ -150,8 +150,15 @@ def run_boats(
             path = log_path(fleet.log_dir, ".mcap", session.begun_unix_s)
             with contextlib.closing(McapWriter(path, header, key=session.key)) as box:
                 outcome.log = box.path
-                session.prepare()
-                drive(Boats(run, session, box))
+                try:
+                    session.prepare()
+                    drive(Boats(run, session, box))
+                finally:
+                    box.close()
+                    outcome.missing = box.missing
+    except KeyboardInterrupt:  # a second signal, or one while boats are left: they are told of as ever
+        run.operator.end("SIGINT")
+        outcome.ended = run.operator.ended
     finally:
         outcome.left = (*session.left, *(f"at the end {text}: take it over by hand" for text in outcome.near))
     return outcome
@@ -243,7 +250,7 @@ def preflight(
     warm_up(run.fleet)
     outcome = run_boats(run, "drill", _drill if drill else None, elsewhere=(*DRILLED, "drill"))
     outcome.ended = run.operator.ended
-    if drill:  # else an earlier drill remains valid
+    if drill and not outcome.ended.startswith("SIG"):  # else an earlier drill remains valid
         refused = [result.name for result in outcome.refused]
         outcome.log = keep(run.fleet, run.text, orders.boat, outcome.checks, refused)
     return outcome

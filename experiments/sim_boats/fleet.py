@@ -37,7 +37,7 @@ LOG = logging.getLogger(__name__)
 
 TICK_S = 0.02  # interval at which autopilots check their clocks and send telemetry, s
 _TICKS_PER_STEP = round(STEP_S / TICK_S)
-_APART_M = 6.0
+_APART_M, _ROOM_M = 6.0, 3.0
 _LONGEST_LAG_S = 1.0  # largest lag behind the clock, s. Beyond it the fleet skips the lost time instead of catching up
 _LONGEST_WAIT_S = 0.1
 """Longest wait for packets, in wall-clock seconds; bounds the time until `SimFleet.close` is noticed."""
@@ -52,11 +52,18 @@ def boats_of(fleet: FleetFile, opponents: str, hulls: Hulls | None = None) -> li
     Such a boat that has a link sends its position there and obeys the link once it is commanded. Boats outside the
     game start along the lower edge of the geofence.
     """
+    config = fleet.shield_config
+    apart_m = max(_APART_M, config.separation_m + 2.0 * config.position_error_m + _ROOM_M)
     boats = []
     for i, boat in enumerate(fleet.boats):
         name, link, platform, plays = boat.name, boat.link, fleet.platform_of[boat.name], boat.agent is not None
         ours = link is not None and boat.commanded and fleet.team_of[name] == fleet.team_number
-        beside = (fleet.geofence.xmin_m + 2.0 + _APART_M * i, fleet.geofence.ymin_m + 2.0, 90.0)
+        row, column = divmod(i, max(1, int((fleet.geofence.xmax_m - fleet.geofence.xmin_m - 4.0) // apart_m) + 1))
+        beside = (
+            fleet.geofence.xmin_m + 2.0 + apart_m * column,
+            fleet.geofence.ymin_m + 2.0 + apart_m * row,
+            90.0,
+        )
         boats.append(
             SimBoat(
                 name=name,

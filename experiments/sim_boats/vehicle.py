@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import time
 from collections import deque
 from dataclasses import dataclass
 from enum import IntEnum
@@ -19,7 +20,6 @@ from .settings import AutopilotSettings
 
 _ESTIMATE_FLAGS = 831  # EKF_STATUS_REPORT: attitude, velocity and position are good
 _VERSION = 4 << 24 | 6 << 16  # 4.6.0, the one that was measured
-_UNIX_2024_US = 1_704_067_200_000_000
 _CAPABILITIES = (
     mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
     | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
@@ -81,8 +81,7 @@ class Telemetry:
         )
 
     def _system_time(self) -> Any:
-        unix_us = _UNIX_2024_US + round(self._now_s * 1e6)
-        return mavlink.MAVLink_system_time_message(unix_us, self._since_boot_ms(self._now_s))
+        return mavlink.MAVLink_system_time_message(time.time_ns() // 1000, self._since_boot_ms(self._now_s))
 
     def _ekf_status_report(self) -> Any:
         flags = _ESTIMATE_FLAGS if self._placed else mavlink.EKF_ATTITUDE

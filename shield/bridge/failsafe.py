@@ -165,9 +165,13 @@ class Failsafe:
         text = f"{boat} does not obey: {reading.why_not or reading.mode}"
         if reading.released_by == FAILSAFE and reading.failsafe_over:
             retakes = self._fleet.limits.after_failsafe == "retake"
-            text += "; it is taken back (after_failsafe)" if retakes else "; its fail-safe is over: take it back"
+            text += "; it is taken back (after_failsafe)" if retakes else "; its fail-safe is over: t takes it back"
             if retakes and reading.age_s <= self._fleet.limits.navigation.max_age_s:
                 self._verdict.retake.add(boat)
+        elif reading.released_by == FAILSAFE:
+            text += "; its own fail-safe holds it: t takes it back once that is over"
+        elif reading.released:
+            text += "; t takes it back, when its pilot agrees"
         self._due("mode.pilot", boat, text, (), response="none")
 
     def _judge_place(self, boat: str) -> None:

@@ -170,6 +170,7 @@ CONDITIONS = {
             "the disk's answer",
             "`log.then`",
             within="1 s; 10 s where the disk only hangs",
+            returns="not in this run: free space, end it and start anew; by itself where the disk only hung",
             disables="the response to a black box that cannot be written; what follows is not recorded",
         ),
         Condition(

@@ -6,9 +6,10 @@ The one place where a link is chosen is `LINK_MAKERS`, by the ``kind`` of a boat
 from __future__ import annotations
 
 import logging
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 
 from ..surroundings import OPEN_WATER, Surroundings
 from .blackbox import TlogWriter, log_path
@@ -26,6 +27,7 @@ from .moos.links import MoosLinks
 LOG = logging.getLogger(__name__)
 
 CONNECT_S = 15.0
+HURRIED_S = 3.0  # boats are waited for no longer once somebody interrupts while they are stopped
 PREPARE_S = 60.0  # an autopilot arms up to 42 s after it was switched on
 
 
@@ -127,8 +129,18 @@ class VehicleSession(Closing):
     def close(self) -> None:
         """Stop every boat, verify it, and give everything back; may be called again."""
         if not self.left:
-            with ThreadPoolExecutor(max(1, len(self.links))) as pool:
-                self.left = tuple(pool.map(_leave, self.links.values()))
+            pool = ThreadPoolExecutor(max(1, len(self.links)))
+            leaving = {name: pool.submit(_leave, link) for name, link in self.links.items()}
+            try:
+                wait(leaving.values())
+            except KeyboardInterrupt:
+                wait(leaving.values(), HURRIED_S)
+                raise
+            finally:
+                pool.shutdown(wait=False)
+                self.left = tuple(
+                    future.result() if future.done() else _as_seen(self.links[name]) for name, future in leaving.items()
+                )
             for link in self.listen_only.values():
                 link.release()
         for maker in self._makers.values():
@@ -164,6 +176,16 @@ def _leave(link: Link) -> str:
     except Exception as error:  # the other boats must still be stopped
         LOG.exception("%s: not left in order", link.boat)
         return f"{link.boat}: not left in order ({error}); it stops by its own time-out"
+
+
+def _as_seen(link: Link) -> str:
+    """What is known of a boat that nobody waits for any longer."""
+    try:
+        seen = link.read()
+    except Exception as error:
+        return f"{link.boat}: told to stop by its link, not verified ({error}); look at it"
+    speed = "speed unknown" if math.isnan(seen.speed_mps) else f"{seen.speed_mps:.1f} m/s"
+    return f"{link.boat}: told to stop by its link, not verified: last seen in {seen.mode or 'no mode'}, {speed}"
 
 
 class MavlinkLinks(LinkMaker):

@@ -226,7 +226,9 @@ class AsyncWriter(Generic[Item]):
             self._work()
             self._store.finish()
         except OSError as error:
-            self._fail(f"the log {self.name} cannot be written: {explain(error)}. What was written before can be read")
+            again = f"end the run: it records nothing more; then {explain(error).partition('; ')[2]} and start anew"
+            why = explain(error).partition("; ")[0]
+            self._fail(f"the log {self.name} cannot be written: {why}; {again}. What was written before can be read")
         except BridgeError as error:
             self._fail(f"{error}. What was written before can be read")
         except Exception as error:  # whatever it is, the loop must learn that nothing is written any more

@@ -57,7 +57,7 @@ class McapFile(Store[Tick | Line]):
         self._counts: dict[str, int] = {}
         self._last_ns = header.unix_ns
         self._due_s = dict.fromkeys(EVERY_S, -1e18)
-        self._undrawn, self._dropped = False, 0
+        self._undrawn, self._dropped, self.kept = False, 0, 0
         self.dropped: Callable[[], int] = lambda: 0
         self._active: dict[tuple[str, str, str], Action] = {}
         self._add(HEADER_TOPIC, HEADER, header.to_message(), header.unix_ns)
@@ -88,6 +88,7 @@ class McapFile(Store[Tick | Line]):
             self._link()
         self._writer.flush()
         super().flush()
+        self.kept = self._counts.get(TICK_TOPIC, 0)
 
     def finish(self) -> None:
         """Write the closing link and the index, close the file."""
@@ -95,6 +96,7 @@ class McapFile(Store[Tick | Line]):
         self._link(ENDS)
         self._writer.finish()
         super().finish()
+        self.kept = self._counts.get(TICK_TOPIC, 0)
 
     def _tell_dropped(self) -> None:
         dropped, before = self.dropped(), self._dropped
@@ -197,6 +199,7 @@ class McapWriter(AsyncWriter[Tick | Line]):
             disk.close()
             raise BridgeError(f"cannot begin the log {path}: {explain(error)}") from error
         file.dropped = lambda: self.dropped
+        self._file, self._taken = file, 0
         super().__init__(path.name, file, capacity=capacity, flush_s=flush_s, give_up_s=give_up_s)
 
     def take(self, tick: Tick) -> None:
@@ -205,7 +208,14 @@ class McapWriter(AsyncWriter[Tick | Line]):
         Raises:
             BridgeError: ticks can no longer be kept; the text says why and what to do.
         """
+        self._taken += 1
         self.put(_snapshot(tick))
+
+    @property
+    def missing(self) -> str:
+        """What the log lacks of the turns it was handed, in words; empty when, once closed, it has all of them."""
+        kept, taken = self._file.kept, self._taken
+        return "" if kept == taken and not self.fault else f"the log is incomplete: {kept} of {taken} turns"
 
     def note(self, text: str, *, name: str = "steerclear", warning: bool = False) -> None:
         """Keep a line of text at the time of the last tick.

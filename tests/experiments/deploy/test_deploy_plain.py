@@ -16,8 +16,9 @@ import numpy as np
 import pytest
 from logged_runs import Encounter, header_of
 from rich.console import Console
-from steerclear.experiments.cli_boats import show_check
+from steerclear.experiments.cli_boats import show_check, show_outcome
 from steerclear.experiments.deploy.keys import FIGURES, figure_rows
+from steerclear.experiments.deploy.orders import Outcome
 from steerclear.experiments.deploy.plain import PlainLines, Tally
 from steerclear.experiments.deploy.quiet import (
     LOOP_FIRST,
@@ -89,8 +90,18 @@ def test_what_lasts_is_said_once_whatever_its_figures_and_again_when_its_respons
     sink.close()
     said = [line.strip() for line in lines if "red_1" in line]
     assert len(said) == 2
-    assert said[0] in {f"red_1 {age} s old" for age in (1.0, 1.5, 2.0)}
-    assert said[1] in {f"red_1 {age} s old" for age in (5.0, 5.5)}
+    for line, response, ages in zip(said, ("slow", "stop"), ((1.0, 1.5, 2.0), (5.0, 5.5)), strict=True):
+        assert line.split("; ")[0] in {f"red_1 {age} s old -> {response}" for age in ages}
+        assert "; control returns: by itself" in line
+
+
+def test_checks_without_which_boats_are_not_safe_are_not_offered_to_be_accepted(capsys):
+    names = ("rates:gannet", "known", "geofence", "backup", "autopilot:gannet", "commanders:gannet")
+    show_outcome(Outcome(refused=[CheckResult(name, False, "no") for name in names]))
+    said = capsys.readouterr().out
+    assert "--accept rates:gannet" in said
+    assert said.count("--accept") == 1
+    assert "put right, boats are not safe without: known, geofence, backup, autopilot:gannet, commanders:gannet" in said
 
 
 @pytest.mark.parametrize(

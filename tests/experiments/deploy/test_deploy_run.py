@@ -3,6 +3,7 @@
 import contextlib
 import json
 import socket
+import threading
 from dataclasses import replace
 
 import pytest
@@ -25,9 +26,11 @@ from steerclear.experiments.deploy.referee import game_config, game_obstacles, p
 from steerclear.experiments.deploy.run import deploy, preflight
 from steerclear.experiments.sim_boats import AutopilotSettings, SimFleet
 from steerclear.shield.bridge.blackbox import LogReader, log_path
+from steerclear.shield.bridge.clock import MonotonicClock
 from steerclear.shield.bridge.control_loop import Timing
 from steerclear.shield.bridge.feed_packets import FeedSender
 from steerclear.shield.bridge.fleet_file import load_fleet
+from steerclear.shield.bridge.messages import BoatReading
 from steerclear.shield.bridge.preflight_checks import CheckResult
 from steerclear.shield.bridge.session import VehicleSession
 from steerclear.shield.exceptions import ConfigError, FleetFileError, LinkError, PolicyError
@@ -116,6 +119,52 @@ def test_a_run_on_simulated_boats_from_preflight_to_stopped(fleet_file, boats, e
     assert any(tick.sent["blue_1"].speed_mps > 0.5 for tick in ticks)
     assert next(tick for tick in ticks if tick.decisions is not None).shield_reset
     assert boats.states()["blue_1"][3] < 0.5
+
+
+def interrupt(*given):
+    raise KeyboardInterrupt
+
+
+def test_a_run_interrupted_at_once_tells_what_is_known_and_an_earlier_drill_stays_valid(fleet_file, boats, entry):
+    outcome = deploy(orders_of(fleet_file, entry, accept=(*BUSY, "drill")), Surface(sinks=interrupt))
+    assert outcome.ended == "SIGINT"
+    assert "HOLD" in outcome.left[0]
+    assert outcome.log.exists()
+    assert outcome.missing == ""
+    before = path_of(load_fleet(fleet_file), None)
+    before.write_text("a drill that passed")
+    outcome = preflight(orders_of(fleet_file), Surface(interrupt))
+    assert outcome.ended == "SIGINT"
+    assert "blue_1" in outcome.left[0]
+    assert before.read_text() == "a drill that passed"
+
+
+def test_boats_whose_stop_nobody_waits_for_any_longer_are_told_as_they_were_last_seen(fleet_file, monkeypatch):
+    class Slow:
+        boat = "blue_1"
+        ends = threading.Event()
+
+        def close(self):
+            self.ends.wait(20.0)
+
+        def read(self):
+            return BoatReading("blue_1", 0.0, mode="GUIDED", speed_mps=1.23)
+
+    calls = []
+
+    def wait(futures, timeout_s=None):
+        calls.append(timeout_s)
+        if timeout_s is None:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("steerclear.shield.bridge.session.wait", wait)
+    session = VehicleSession(load_fleet(fleet_file), None, MonotonicClock(), tlog=False)
+    session.links = {"blue_1": Slow()}
+    with pytest.raises(KeyboardInterrupt):
+        session.close()
+    Slow.ends.set()
+    assert session.left == ("blue_1: told to stop by its link, not verified: last seen in GUIDED, 1.2 m/s",)
+    assert 0.0 < calls[1] <= 5.0
 
 
 def test_deploy_refuses_to_start_without_its_preflight_and_moves_nothing(fleet_file, boats, entry):

@@ -12,6 +12,7 @@ from steerclear.experiments.cli import app
 from steerclear.experiments.deploy.demo import demo_file, free_ports
 from steerclear.experiments.sim_boats import RadioSettings, SimBoat, SimFleet
 from steerclear.experiments.sim_boats.faults import Incident, faults_page, parse_incident
+from steerclear.experiments.sim_boats.fleet import boats_of
 from steerclear.shield.bridge.clock import ManualClock
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.exceptions import ConfigError
@@ -24,6 +25,30 @@ HERE = "127.0.0.1"
 def test_the_page_of_faults_is_made_of_the_code():
     page = (Path(__file__).parents[3] / "docs" / "boat_reference.md").read_text()
     assert f"<!-- faults -->\n{faults_page()}\n<!-- /faults -->" in page
+
+
+@pytest.mark.parametrize(("settings", "least_m"), [("", 6.0), ("separation_m: 4.0, position_error_m: 1.0", 9.0)])
+def test_boats_without_a_game_start_as_far_apart_as_their_file_wants_and_inside(settings, least_m):
+    lines = [
+        f"  - {{name: b{k}, team: blue, platform: heron, link: {{kind: mavlink, address: 'udpin:{HERE}:14550', "
+        f"system_id: {k + 1}}}}}"
+        for k in range(5)
+    ]
+    head = "version: 1\nteam: blue\nfield: {origin: {latitude_deg: 42.0, longitude_deg: -71.0}, size_m: [20, 40]}\n"
+    fence = f"geofence: {{xmin_m: 0, ymin_m: 0, xmax_m: 30, ymax_m: 40}}\nshield: {{{settings}}}\nboats:\n"
+    starts = [boat.start for boat in boats_of(parse_fleet(head + fence + "\n".join(lines)), "")]
+    assert min(math.dist(a[:2], b[:2]) for a, b in itertools.combinations(starts, 2)) >= least_m
+    assert all(0.0 < x < 30.0 and 0.0 < y < 40.0 for x, y, _ in starts)
+
+
+def test_the_simulated_gps_tells_the_real_time():
+    fleet = alone()
+    try:
+        message = fleet.boats["b"].autopilot._telemetry.build(2, fleet.boats["b"].seen, 0.0)
+    finally:
+        fleet.close()
+    assert message.get_type() == "SYSTEM_TIME"
+    assert message.time_unix_usec * 1e-6 == pytest.approx(time.time(), abs=5.0)
 
 
 def alone(**settings):

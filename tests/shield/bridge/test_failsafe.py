@@ -174,10 +174,10 @@ def test_what_its_own_failsafe_took_is_offered_or_taken_back_only_once_that_is_o
         verdict, text = judged(by, over)
         assert (verdict.retake, verdict.idle) == (set(), {"blue_1"})
         assert "it is in HOLD" in text
-        assert "take" not in text
+        assert ("t takes it back, when its pilot agrees" if by == "pilot" else "once that is over") in text
     verdict, text = judged("failsafe", True)
     assert verdict.retake == ({"blue_1"} if after == "retake" else set())
-    assert ("take it back" in text) == (after == "wait")
+    assert ("t takes it back" in text) == (after == "wait")
     assert judged("failsafe", True, position_age_s=1.0)[0].retake == set(), "not while nobody knows where it is"
 
 

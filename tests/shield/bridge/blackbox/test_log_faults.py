@@ -3,6 +3,7 @@
 import errno
 import gc
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -16,6 +17,7 @@ import pytest
 from logged_runs import Encounter, header_of, numbered, write_log
 from steerclear.shield.bridge.blackbox import Disk, LogReader, McapWriter, TlogWriter, foxglove
 from steerclear.shield.bridge.blackbox.recorder import McapFile
+from steerclear.shield.bridge.failsafe_table import CONDITIONS
 from steerclear.shield.bridge.messages import Tick
 from steerclear.shield.exceptions import BridgeError
 from waiting import wait_for
@@ -140,8 +142,8 @@ def test_a_log_being_written_can_be_read(tmp_path, ticks):
 def test_a_full_disk_is_said_at_once_in_words_and_what_was_written_is_read(tmp_path, ticks):
     writer, _ = opened(tmp_path, FullDisk)
     assert take_until_it_fails(writer, ticks) == (
-        "the log run.mcap cannot be written: the disk is full; free space on it or set log_dir to another disk. What "
-        "was written before can be read"
+        "the log run.mcap cannot be written: the disk is full; end the run: it records nothing more; then free "
+        "space on it or set log_dir to another disk and start anew. What was written before can be read"
     )
     with pytest.raises(BridgeError, match="the disk is full"):
         writer.take(ticks[0])
@@ -150,6 +152,9 @@ def test_a_full_disk_is_said_at_once_in_words_and_what_was_written_is_read(tmp_p
     found, complete, _ = kept(tmp_path / "run.mcap")
     assert found == list(range(len(found)))
     assert len(found) > 20
+    said = re.fullmatch(r"the log is incomplete: (\d+) of (\d+) turns", writer.missing)
+    assert int(said[1]) <= len(found) < int(said[2])
+    assert "not in this run" in CONDITIONS["log"].returns
     assert not complete
     assert not is_writing()
 
