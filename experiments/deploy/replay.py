@@ -184,6 +184,9 @@ def _log_lines(replay: Replay) -> Iterator[RenderableType]:
 
 def _chain_lines(replay: Replay) -> Iterator[RenderableType]:
     chain = replay.chain
+    if chain.broken == 1 and chain.unkeyed:
+        yield Text(f"Hash chain: {chain.breaks[0]}.", style="yellow")
+        return
     if chain.broken:
         yield Text("Hash chain: damaged. The log is not as it was written:", style="red")
         yield from (Text(f"  {text}") for text in chain.breaks[:MOST_ROWS])

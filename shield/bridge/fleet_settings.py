@@ -336,6 +336,8 @@ def explain(error: ValidationError, root: type[BaseModel]) -> str:
         text = f"{name} is missing; {remedy or 'give it'}"
     else:
         said = "" if remedy and fault["type"] == "string_pattern_mismatch" else f": {_said(fault['msg'])}"
+        comma = isinstance(fault["input"], str) and re.fullmatch(r"[-+]?\d+,\d+", fault["input"])
+        said = ": a decimal point is wanted, no comma" if comma else said
         text = f"{name} is {short(repr(fault['input']))}{said}; {remedy or 'correct it'}"
     return text if len(faults) == 1 else f"{text} (and {len(faults) - 1} more)"
 

@@ -51,6 +51,7 @@ def read_settings(text: str) -> Any:
     except yaml.YAMLError as error:
         mark, problem = getattr(error, "problem_mark", None), getattr(error, "problem", None)
         said = f"line {mark.line + 1}: {problem}" if mark and problem else " ".join(str(error).split())
+        said += "; indent by spaces, not by tabs" if r"'\t'" in said else ""
         said = "".join(letter if letter.isprintable() else "?" for letter in said)
         raise FleetFileError(short(said, 300)) from None
 

@@ -127,13 +127,14 @@ class ChainCheck:
 
     Attributes:
         keyed: whether its links carry codes.
+        unkeyed: whether they do not, though a key was given.
         codes_checked: how many codes were found right.
         breaks: what does not fit, in words, `MOST_BREAKS` at most.
         broken: how many things do not fit.
     """
 
     def __init__(self, key: bytes | None = None) -> None:
-        self.keyed = False
+        self.keyed = self.unkeyed = False
         self.codes_checked = self.broken = 0
         self.breaks: list[str] = []
         self._key, self._end, self._early = key, "", 0
@@ -151,8 +152,9 @@ class ChainCheck:
 
     def begin(self, head: ChainHead) -> None:
         """The header of the file was met, with this head in it."""
-        if self._key is not None and not head.keyed:
-            self._tell("it carries no codes, though a key was given: it was written without the key")
+        self.unkeyed = self._key is not None and not head.keyed
+        if self.unkeyed:
+            self._tell("it carries no codes: made without a key, which cannot be checked with the one given")
         if self._early:
             self._tell(f"{self._early} records stand before the header")
         if head.count:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import errno
 import json
 import logging
+import os
 import re
 import struct
+import zlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,6 +28,7 @@ from .recorder import HEADER_TOPIC, LINK_TOPIC, LOG_TOPIC, TICK_TOPIC
 
 LOG = logging.getLogger(__name__)
 
+CHECKSUM_TO_END = 12  # bytes of a file's checksum of its index and of what ends the file after it
 LARGEST_RECORD = 64 << 20  # longer records than this are damage, bytes
 _DAMAGE = (McapError, CRCValidationError, ZstdError, struct.error, UnicodeDecodeError, MemoryError, OverflowError)
 _PART = re.compile(r"(?P<first>.+)\.part[1-9]\d*(?P<ending>\.[^.]*)")
@@ -158,6 +161,15 @@ def _object(message: Message) -> Mapping[str, Any]:
     return found
 
 
+def _index_holds(file: IO[bytes], footer: Footer) -> bool:
+    """Whether the bytes after the data, up to the checksum in the footer itself, are those that were written."""
+    end = file.seek(0, os.SEEK_END) - CHECKSUM_TO_END
+    if not 0 < footer.summary_start <= end:
+        return False
+    file.seek(footer.summary_start)
+    return zlib.crc32(file.read(end - footer.summary_start)) == footer.summary_crc
+
+
 def read_records(file: IO[bytes], tell: Tell) -> Iterator[Any]:
     """Schemas, channels, messages and, when the file was closed properly, its footer; chunks taken apart.
 
@@ -165,7 +177,7 @@ def read_records(file: IO[bytes], tell: Tell) -> Iterator[Any]:
         file: at its beginning.
         tell: gets a text about each part that cannot be read; nothing is raised for them.
     """
-    closed = False
+    closed, footer = False, None
     try:
         for item in StreamReader(file, emit_chunks=True, record_size_limit=LARGEST_RECORD).records:
             if isinstance(item, Chunk):
@@ -177,9 +189,12 @@ def read_records(file: IO[bytes], tell: Tell) -> Iterator[Any]:
                 yield from parts
             elif isinstance(item, (Schema, Channel, Message, Footer)):
                 closed = isinstance(item, Footer)
+                footer = item if isinstance(item, Footer) else footer
                 yield item
         if file.read(1):
             tell("after its end more bytes follow, which were not read")
+        elif footer is not None and not _index_holds(file, footer):
+            tell("bytes of its index, after the chain's end, are not as they were written")
     except EndOfFile:
         return  # cut off: the footer that was not there tells
     except _DAMAGE as error:

@@ -163,6 +163,7 @@ def test_boats_whose_stop_nobody_waits_for_any_longer_are_told_as_they_were_last
     with pytest.raises(KeyboardInterrupt):
         session.close()
     Slow.ends.set()
+    session.close()
     assert session.left == ("blue_1: told to stop by its link, not verified: last seen in GUIDED, 1.2 m/s",)
     assert 0.0 < calls[1] <= 5.0
 

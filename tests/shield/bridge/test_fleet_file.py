@@ -225,6 +225,7 @@ def test_what_programs_read_in_several_ways_is_refused_with_the_remedy(word):
         ("a: {b: 1,\n b: 2}", "line 2: key 'b' is given twice"),
         ("a: 1\n---\nb: 2", "line 2: a second document"),
         ("a: *b", "line 1: no anchor 'b'"),
+        ("a:\n\tb: 1", "line 2: .*; indent by spaces, not by tabs"),
         ("a: &b [*b]", "line 1: no anchor 'b' is complete"),
         ('a: "x\\0"', "cannot be seen"),
         ('a: "\\ud800"', "cannot be seen"),
@@ -242,6 +243,11 @@ def test_what_has_no_place_in_a_fleet_file_is_refused(text, said):
     with pytest.raises(FleetFileError, match=said) as caught:
         read_settings(text)
     assert str(caught.value).isprintable()
+
+
+def test_a_decimal_comma_is_told_as_one():
+    with pytest.raises(FleetFileError, match=r"latitude_deg is '47,6500': a decimal point is wanted, no comma"):
+        parse_fleet(fleet_text().replace("latitude_deg: 42.0, ", "latitude_deg: '47,6500', "))
 
 
 def test_aliases_say_what_their_anchor_said():
