@@ -65,9 +65,11 @@ class SeaOptions:
 def _with_direction(text: str, option: str) -> tuple[float, float]:
     size, at, direction = text.partition("@")
     try:
-        return float(size), float(direction) if at else 0.0
+        if at or float(size) == 0.0:
+            return float(size), float(direction) if at else 0.0
     except ValueError:
-        raise ConfigError(f"{option} is {text!r}; give m/s@deg, such as 5@270") from None
+        pass
+    raise ConfigError(f"{option} is {text!r}; give m/s@deg, such as 5@270")
 
 
 @dataclass(frozen=True)
@@ -148,7 +150,7 @@ def sim_boats(
         files = [] if record is None or not boats.is_playing else [str(save(boats.truth_record(), record))]
     finally:
         boats.close()
-    _show_boats(content, files)
+    _show_boats(content, files, bool(file.agent_ids))
     if json_file is not None:
         given = {**vars(how), **vars(sea), **vars(radio), **vars(hulls), "fault": hulls.fault or []}
         chosen = {name: value for name, value in given.items() if name not in ("demo", "allow_remote", "with_parent")}
@@ -211,12 +213,12 @@ def _simulate(boats: SimFleet, plan: Plan, duration_s: float | None) -> bool:
     return False
 
 
-def _show_boats(content: dict[str, Any], files: list[str]) -> None:
+def _show_boats(content: dict[str, Any], files: list[str], plays: bool) -> None:
     out().print(approaches_table(content))
     if content["violations"] is not None:
         out().print(verdicts_table(content))
     say(*files)
-    if not content["played"]:
+    if not content["played"] and plays:
         warn("the game never began (not every boat was commanded): nothing was recorded")
 
 

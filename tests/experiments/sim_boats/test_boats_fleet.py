@@ -41,6 +41,22 @@ def test_boats_without_a_game_start_as_far_apart_as_their_file_wants_and_inside(
     assert all(0.0 < x < 30.0 and 0.0 < y < 40.0 for x, y, _ in starts)
 
 
+def test_boats_without_a_game_are_not_told_that_none_began(tmp_path):
+    (port,) = free_ports(1)
+    head = "version: 1\nteam: blue\nfield: {origin: {latitude_deg: 42.0, longitude_deg: -71.0}, size_m: [20, 40]}\n"
+    fence = "geofence: {xmin_m: 0, ymin_m: 0, xmax_m: 30, ymax_m: 40}\nboats:\n"
+    link = f"{{kind: mavlink, address: 'udpin:{HERE}:{port}', system_id: 1}}"
+    boat = f"  - {{name: b, team: blue, platform: heron, link: {link}}}\n"
+    path = tmp_path / "FLEET.yaml"
+    path.write_text(head + fence + boat)
+    result = CliRunner().invoke(app, ["sim-boats", str(path), "--duration", "1", "--speed", "10"])
+    assert result.exit_code == 0, result.output
+    assert "the game never began" not in result.output
+    wrong = CliRunner().invoke(app, ["sim-boats", str(path), "--current", "0.5"])
+    assert wrong.exit_code == 2
+    assert "give m/s@deg" in wrong.output
+
+
 def test_the_simulated_gps_tells_the_real_time():
     fleet = alone()
     try:
