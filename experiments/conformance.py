@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
+from gymnasium.spaces import Discrete
 from steerclear import policies
 from steerclear.env.mctf import MctfEnv
 from steerclear.policies.protocol import TeamPolicy
@@ -85,8 +86,11 @@ def check_platform(name: str | Platform) -> None:
 def check_reader(make_env: Callable[[], Any]) -> None:
     """A reader sees all boats, and lets commands through as they are when nothing filters them.
 
-    ``make_env`` builds the environment; each one, reset with the same seed, is the same game.
+    ``make_env`` builds the environment; each one, reset with the same seed, is the same game. Boats without discrete
+    actions play samples of their ``action_space(agent)``.
     """
+    if not callable(make_env):
+        raise ConfigError(f"make_env is {type(make_env).__name__}; give a function that builds the env: lambda: env")
     plain, filtered = make_env(), make_env()
     plain_reader, reader = reader_of(plain), reader_of(filtered)
     facts, seen, agents = reader.facts(), list[Array](), reader.agent_ids
@@ -101,18 +105,28 @@ def check_reader(make_env: Callable[[], Any]) -> None:
         return commands
 
     for step in range(STEPS):
-        actions = {agent: (step + i) % 16 for i, agent in enumerate(agents)}
+        actions = {agent: _any_action(plain, agent, step + i) for i, agent in enumerate(agents)}
         plain.step(plain_reader.playable(actions))
         with reader.filtering(passing):
             filtered.step(reader.playable(actions))
         fleet, same = plain_reader.fleet(0, True), reader.fleet(0, True)
         _hold(len(fleet.names) == n and bool(np.isfinite(fleet.state[:, : L.SPEED + 1]).all()), "a fleet lacks boats")
-        _hold(np.array_equal(fleet.state, same.state), "the game is another one under a filter that changes nothing")
+        alike = np.array_equal(fleet.state, same.state, equal_nan=True)  # what a fleet does not know is NaN
+        _hold(alike, "the game is another one under a filter that changes nothing")
         moments.add(reader.moment())
     _hold(len(moments) == STEPS + 1, "moment() is the same after a step; give the game's time")
     _hold(bool(seen) and all(c.shape == (n, 2) for c in seen), f"filtering hands over no commands of shape ({n}, 2)")
     for team in (0, 1):
         reader.surroundings(team, True)
+
+
+def _any_action(env: Any, agent: str, number: int) -> Any:
+    """Return an action for a boat: a whole number, or a sample where its action space is known to be another."""
+    space = env.action_space(agent) if callable(getattr(env, "action_space", None)) else None
+    if space is None or isinstance(space, Discrete):
+        return number % 16
+    space.seed(number)
+    return space.sample()
 
 
 def check_barrier(name: str, area_m: tuple[float, float, float, float] = (-100.0, -100.0, 100.0, 100.0)) -> None:

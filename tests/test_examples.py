@@ -24,7 +24,7 @@ SAYS = {
     "masked_ppo": "12 learners, 17 actions each, ",
     "own_barrier": "nearest: 0.",
     "own_encounter": "without a shield 0.03 m",
-    "own_loop": "shield on: nearest 4.",
+    "own_loop": "shield on: nearest 3.",
     "own_platform": "launch turns to",
     "own_policy": "every boat straight to the flag",
     "own_reader": "read by FoggyReader",

@@ -21,6 +21,7 @@ from steerclear.shield.barriers import registry as barriers
 from steerclear.shield.barriers.registry import Barrier, get_barrier
 from steerclear.shield.exceptions import ConfigError, PlatformError
 from steerclear.shield.platforms import get_platform, known_platforms, register_platform, registry
+from steerclear.shield.platforms import layout as L
 from steerclear.shield.wrappers import ShieldedParallelEnv, game_reader, reader_of, readers
 from steerclear.shield.wrappers.mctf import MctfReader
 
@@ -160,6 +161,27 @@ class Stopped(MctfReader):
 
     def moment(self):
         return 0.0
+
+
+class SeenFromOutside(MctfReader):
+    """Knows no autopilot's memory, as fleets by `Fleet.of`."""
+
+    def fleet(self, team, shield_autopilot):
+        seen = super().fleet(team, shield_autopilot)
+        state = seen.state.copy()
+        state[:, L.SPEED + 1 :] = np.nan
+        return replace(seen, state=state)
+
+
+@pytest.mark.parametrize("actions", ["discrete", "continuous"])
+def test_a_reader_may_not_know_all_and_its_env_may_take_any_actions(apart, actions):
+    game_reader(lambda env: isinstance(env, MctfEnv))(SeenFromOutside)
+    check_reader(lambda: MctfEnv("aamas2024", action_kind=actions))
+
+
+def test_an_env_in_place_of_its_maker_is_refused():
+    with pytest.raises(ConfigError, match="make_env is MctfEnv; give a function"):
+        check_reader(MctfEnv("aamas2024"))
 
 
 @pytest.mark.parametrize(
