@@ -18,7 +18,7 @@ import math
 
 import numpy as np
 
-from ..backup.assign import assign_manoeuvres
+from ..backup.assign import assign_manoeuvres, score_all
 from ..backup.family import IN_MEMORY, candidate, remembered
 from ..backup.rollout import roll_out
 from ..backup.score import (
@@ -36,7 +36,7 @@ from ..barriers.boats import reported_margin
 from ..barriers.clearance import MARGIN
 from ..barriers.static import clear_of_near_obstacles
 from ..barriers.value_function import run_opponents
-from ..jit import Array, lean_kernel
+from ..jit import Array, copy_row, lean_kernel
 from ..platforms import layout as L
 from ..platforms.actuator import command_for_turn, full_turn
 from ..workspace import BACKUP, BEST_EFFORT, STOPPED, Scene
@@ -140,6 +140,16 @@ def _passed_block(count: int, scene: Scene) -> bool:
 
 
 @lean_kernel
+def _mates_meet(count: int, scene: Scene) -> bool:
+    """Return whether a mover's backup comes too near to a teammate: those that passed may leave it room elsewhere."""
+    for m in range(count):
+        i = scene.movers[m]
+        if scene.satisfied[i] < CLEAR_OF_KNOWN and scene.active[i] >= 0 and scene.ours[scene.active[i]]:
+            return True
+    return False
+
+
+@lean_kernel
 def _join(scene: Scene) -> int:
     """Make movers of own boats that could meet movers; return the number of movers."""
     ours = scene.ours
@@ -182,6 +192,37 @@ def _assign_backups(count: int, scene: Scene) -> bool:
 
 
 @lean_kernel
+def _worst_off(scene: Scene) -> Score:
+    """Return the score of the own boat that is worst off."""
+    worst = Score(CLEAR_OF_ALL + 1, 0.0)
+    for i in range(scene.ours.shape[0]):
+        if scene.ours[i] and better(worst, score_of(i, scene)):
+            worst = score_of(i, scene)
+    return worst
+
+
+@lean_kernel
+def _stop_if_better(count: int, scene: Scene) -> None:
+    """Make all movers stop instead, where the boat that is worst off is better off so.
+
+    The search changes the manoeuvre of one boat at a time. Of several that are near each other and would all have to
+    stop, none is better off if it alone does.
+    """
+    found = _worst_off(scene)
+    for m in range(count):
+        i = scene.movers[m]
+        copy_row(scene.held[i], scene.manoeuvre[i])
+        roll_out(i, i, 1.0, 0.0, 0.0, 0, scene)
+    score_all(scene)
+    if better(_worst_off(scene), found):
+        return
+    for m in range(count):
+        i = scene.movers[m]
+        roll_out(i, i, scene.held[i, 0], scene.held[i, 1], scene.held[i, 2], 0, scene)
+    score_all(scene)
+
+
+@lean_kernel
 def _find_backups(count: int, scene: Scene) -> None:
     """Make a candidate of all movers' backups and check it.
 
@@ -193,10 +234,12 @@ def _find_backups(count: int, scene: Scene) -> None:
     for _ in range(ours.shape[0]):
         if _assign_backups(count, scene):
             break
-        movers = _join(scene) if _passed_block(count, scene) else _join_short(scene)
+        movers = _join(scene) if _passed_block(count, scene) or _mates_meet(count, scene) else _join_short(scene)
         if movers == count:
             break
         count = movers
+    if count > 1 and _worst_off(scene).satisfied < CLEAR_OF_BOATS:
+        _stop_if_better(count, scene)
     run_opponents(1, scene)
     for m in range(count):
         if scene.reason[scene.movers[m]] != STOPPED:

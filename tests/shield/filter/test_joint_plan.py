@@ -7,6 +7,7 @@ from steerclear.shield.barriers.boats import clear_of_boat
 from steerclear.shield.barriers.clearance import FAR, MARGIN
 from steerclear.shield.decision import Reason
 from steerclear.shield.model import boats_of, tuning_of
+from steerclear.shield.platforms import get_platform
 
 
 def fleet_of(boats, **settings):
@@ -101,3 +102,27 @@ def test_errors_of_others_grow_over_the_delay_that_is_counted():
 def test_paths_of_one_kind_of_boat_are_as_long_as_before():
     boats = boats_of(ShieldConfig(), ("heron",) * 6, (0, 0, 0, 1, 1, 1))
     assert boats.longest_samples == boats.samples.max() == boats.samples.min()
+
+
+def lying_near(random, boats):
+    """Places of boats, m, no two nearer than 2.56 m, that all could lie still, and their headings, deg."""
+    while True:
+        place = random.uniform(-2.2, 2.2, (boats, 2)) * np.sqrt(boats / 2.0)
+        apart = np.hypot(*(place[:, None] - place[None]).transpose(2, 0, 1)) + 9.0 * np.eye(boats)
+        if apart.min() > 2.56:
+            return place, random.uniform(-180.0, 180.0, boats), apart.min()
+
+
+@pytest.mark.parametrize("platform", ["si", "di", "heron", "surveyor"])
+@pytest.mark.parametrize("boats", [3, 4])
+def test_boats_at_rest_that_are_all_sent_to_the_middle_find_a_plan_at_once(boats, platform):
+    """Two of them may find no way out but one that a third, whose command passed, could leave open; or all stop."""
+    random, top = np.random.default_rng(boats), get_platform(platform).max_speed_mps
+    for _ in range(100):
+        place, heading, apart = lying_near(random, boats)
+        to_middle = np.degrees(np.arctan2(*(place.mean(axis=0) - place).T))
+        rows = [(*place[i], heading[i], 0.0) for i in range(boats)]
+        nominal = Commands.absolute_deg(np.stack([np.full(boats, top), to_middle], axis=1))
+        decisions = Shield().decide(fleet_of(rows, platforms=platform), nominal)
+        assert not (decisions.reason == Reason.BEST_EFFORT).any(), (place, heading)
+        assert decisions.safety_margin_m.min() >= min(0.0, apart - 2.55) - 1e-3
