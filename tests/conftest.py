@@ -98,13 +98,15 @@ def pytest_pyfunc_call(pyfuncitem):
 @pytest.fixture(autouse=True)
 def logs_are_as_before():
     """Submissions that run in the tests' own process may switch logs off, and nobody puts that back for them."""
+    level = logging.root.level
     yield
     logging.disable(logging.NOTSET)
+    logging.root.setLevel(level)
     for name in list(logging.root.manager.loggerDict):
         if name.startswith("steerclear"):
             logger = logging.getLogger(name)
             logger.disabled, logger.propagate = False, True
-    logging.getLogger("steerclear").setLevel(logging.NOTSET)
+            logger.setLevel(logging.NOTSET)
 
 
 @pytest.fixture

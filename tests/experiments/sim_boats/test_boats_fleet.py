@@ -241,7 +241,7 @@ def test_a_fleet_from_its_file_with_a_key_boats_of_nobody_and_boats_beside(tmp_p
         assert policies == dict.fromkeys(fleet.boats, "") | dict.fromkeys(("red_1", "red_2", "red_3"), "rammer")
         assert fleet.boats["blue_1"].autopilot._codec.signs
         assert fleet.frame == parse_fleet(text).frame
-        assert tuple(fleet.states()["safety"][:2]) == (33.0, -3.0)
+        assert tuple(fleet.states()["safety"][:2]) == pytest.approx((33.6, -3.0))
         fleet.advance(1.0)
     finally:
         fleet.close()
