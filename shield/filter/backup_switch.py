@@ -211,14 +211,16 @@ def _stop_if_better(count: int, scene: Scene) -> None:
     found = _worst_off(scene)
     for m in range(count):
         i = scene.movers[m]
-        copy_row(scene.held[i], scene.manoeuvre[i])
-        roll_out(i, i, 1.0, 0.0, 0.0, 0, scene)
+        if scene.reason[i] != STOPPED:  # those stop already, and what they hold is not written again
+            copy_row(scene.held[i], scene.manoeuvre[i])
+            roll_out(i, i, 1.0, 0.0, 0.0, 0, scene)
     score_all(scene)
     if better(_worst_off(scene), found):
         return
     for m in range(count):
         i = scene.movers[m]
-        roll_out(i, i, scene.held[i, 0], scene.held[i, 1], scene.held[i, 2], 0, scene)
+        if scene.reason[i] != STOPPED:
+            roll_out(i, i, scene.held[i, 0], scene.held[i, 1], scene.held[i, 2], 0, scene)
     score_all(scene)
 
 

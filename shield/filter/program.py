@@ -138,10 +138,10 @@ class SolverCall:
         scene, n = self._scene, 2 * count
         try:
             z = self._solver(Program(scene.C[:rows, :n], scene.d[:rows], scene.z0[:n]))
+            if z is not None:
+                scene.z[:n] = z
         except BaseException as error:  # compiled code passes none on
             z, self._raised = None, error
-        if z is not None:
-            scene.z[:n] = z
         return int(z is not None)
 
     def raise_what_was_raised(self) -> None:

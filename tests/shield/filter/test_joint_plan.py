@@ -126,3 +126,21 @@ def test_boats_at_rest_that_are_all_sent_to_the_middle_find_a_plan_at_once(boats
         decisions = Shield().decide(fleet_of(rows, platforms=platform), nominal)
         assert not (decisions.reason == Reason.BEST_EFFORT).any(), (place, heading)
         assert decisions.safety_margin_m.min() >= min(0.0, apart - 2.55) - 1e-3
+
+
+def test_boats_that_the_last_line_stops_are_predicted_to_stop_as_they_lie():
+    """Whatever the others are tried with meanwhile: none of them is taken to turn."""
+    stopped = 0
+    for seed in range(200):
+        random = np.random.default_rng(seed)
+        boats, width = int(random.integers(3, 6)), random.uniform(3.0, 8.0)
+        wall = ((-width / 2, -60.0), (width / 2, -60.0), (width / 2, 0.0), (-width / 2, 0.0))
+        place = random.uniform([-width / 2 - 2.0, -4.0], [width / 2 + 2.0, 4.0], (boats, 2))
+        rows = np.column_stack([place, random.uniform(-180.0, 180.0, boats), random.uniform(0.0, 2.0, boats)])
+        nominal = Commands.absolute_deg(np.column_stack([np.full(boats, 2.0), random.uniform(-180.0, 180.0, boats)]))
+        shield = Shield(beyond_then="stop", beyond_m=3.0)
+        decisions = shield.decide(fleet_of(rows), nominal, Surroundings(polygons=[wall]))
+        stops = decisions.reason == Reason.STOPPED
+        stopped += stops.sum()
+        assert np.isnan(shield._deciders.scene.held[stops, 1]).all(), "no heading to turn to"
+    assert stopped > 100
