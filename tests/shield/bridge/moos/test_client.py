@@ -1,7 +1,6 @@
 """A client against a MOOSDB: the stand-in, and the real one where it is on the path."""
 
 import contextlib
-import logging
 import os
 import shutil
 import signal
@@ -19,8 +18,6 @@ from steerclear.shield.bridge.moos.client import MoosClient
 from steerclear.shield.bridge.moos.stand_in import StandInDb
 from steerclear.shield.bridge.moos.wire import PROTOCOL, Message, pack_packet, timing
 from waiting import until
-
-logging.getLogger("steerclear").setLevel(logging.ERROR)
 
 
 @contextlib.contextmanager
