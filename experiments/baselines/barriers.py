@@ -7,27 +7,34 @@ m/s. R is the required radius, m, and s = sqrt(|p|^2 - R^2). A pair's constraint
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import product
-from typing import NamedTuple
 
 import numpy as np
+from steerclear.shield.calls import checked_calls
+from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array
 
+from .own_filters import Jet, check_gains, check_jet, name_of
+
 Gains = tuple[float, ...]
-Jet = tuple[Array, Array, Array]
-"""h, and its gradients in p and in what the inputs act on: v, or p if the inputs are velocities."""
 NEAREST_M2, STILL_MPS = 1e-4, 1e-6
 """Lower bound of s^2 (derivative 0 below it), and smoothing of |v|: the papers leave both open."""
 WIDENED = 1.05
 RATES_PER_S = (0.025, 0.05, 0.075, 0.1, 0.15, 0.2, 0.35, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0, 10.0, 20.0)
 
 
-class Barrier(NamedTuple):
+@checked_calls()
+@dataclass(frozen=True)
+class Barrier:
     """A barrier of the literature: its ``jet`` (p, v, R, *further gains) and its gains, alpha (1/s) first.
 
     ``tuned``: gains by platform, the winners of `sweep` among those ``tried``; other platforms use the first of
     ``tried``. Inputs are velocities (``of_velocity``) or those of `unicycle`; the radius is multiplied by ``widened``.
+
+    Raises:
+        ConfigError: ``jet`` is no function, or gains are none, not numbers, or not as many everywhere.
     """
 
     jet: Callable[..., Jet]
@@ -35,6 +42,30 @@ class Barrier(NamedTuple):
     tried: tuple[Gains, ...]
     of_velocity: bool = False
     widened: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not callable(self.jet):
+            raise ConfigError(
+                f"jet is {name_of(self.jet)}; give a function of (p, v, radius_m, further gains) that gives h and its "
+                "gradients in p and in v"
+            )
+        if not isinstance(self.tried, tuple | list) or not self.tried:
+            raise ConfigError(f"tried is {self.tried!r}; give at least one tuple of gains, as tried=((0.5,),)")
+        if not isinstance(self.tuned, dict):
+            raise ConfigError(f"tuned is {self.tuned!r}; give gains by platform, as tuned={{'heron': (0.5,)}}, or {{}}")
+        for gains in self.tried:
+            check_gains(gains, "one of tried", None if gains is self.tried[0] else self.count)
+        for platform, gains in self.tuned.items():
+            check_gains(gains, f"tuned[{platform!r}]", self.count)
+
+    @property
+    def count(self) -> int:
+        """Number of gains."""
+        return len(self.tried[0])
+
+    def of(self, p: Array, v: Array, radius_m: float, gains: Sequence[Array]) -> Jet:
+        """Return what ``jet`` gives; ConfigError where it takes other arguments or gives something else."""
+        return check_jet(self.jet, p, v, radius_m, gains)
 
 
 def dot(a: Array, b: Array) -> Array:

@@ -16,6 +16,7 @@ from steerclear.shield.jit import Array, BoolArray, IntArray
 from steerclear.shield.surroundings import OPEN_WATER, Surroundings
 
 from .barriers import BARRIERS
+from .own_filters import check_maker, made_filter
 from .plcbf import PolicyLibrary
 from .reach import ReachFilter
 from .rollouts import Gatekeeper
@@ -156,8 +157,9 @@ def build_filter(safety_filter: str | FilterMaker, scenes: Scenes, conditions: C
     """Build the filter with a name, or call a maker, for a batch of scenes; conditions become settings.
 
     Raises:
-        ConfigError: an unknown name, or a filter that cannot honour the conditions.
+        ConfigError: an unknown name, what makes no filter, or a filter that cannot honour the conditions.
     """
+    check_maker(safety_filter)
     base, settings = split_name(safety_filter) if isinstance(safety_filter, str) else ("", {})
     if isinstance(safety_filter, str):
         check_filter(safety_filter)
@@ -171,4 +173,4 @@ def build_filter(safety_filter: str | FilterMaker, scenes: Scenes, conditions: C
     )
     around = OPEN_WATER if scenes.field is None else Surroundings(field=scenes.field)
     fleet = (config, scenes.games, scenes.platforms, tuple(scenes.team.tolist()), around)
-    return safety_filter(*fleet) if callable(safety_filter) else FILTERS[base].make(*fleet, settings)
+    return made_filter(safety_filter, fleet) if callable(safety_filter) else FILTERS[base].make(*fleet, settings)

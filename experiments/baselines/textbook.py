@@ -25,6 +25,7 @@ from steerclear.shield.renamed import old_names
 
 from .barriers import BARRIERS, Barrier, Gains, dot
 from .base import BatchFilter, Games, game_of
+from .own_filters import check_gains
 from .unicycle import SOLVED, UNSOLVED, command_of_inputs, holds, input_limits, inputs_of_command, solve
 
 __all__ = ["BARRIERS", "NAMES", "Barrier", "TextbookFilter"]
@@ -65,8 +66,10 @@ class TextbookFilter(BatchFilter):
         if name not in BARRIERS:
             raise ConfigError(f"unknown filter {name!r}; choose one of {', '.join(NAMES)}")
         it = BARRIERS[name]
-        if gains is not None and len(gains) != len(it.tried[0]):
-            raise ConfigError(f"{len(gains)} gains for {name}; give {len(it.tried[0])}, alpha (1/s) the first")
+        if gains is not None:
+            check_gains(gains, f"gains of {name}")
+            if len(gains) != it.count:
+                raise ConfigError(f"{len(gains)} gains for {name}; give {it.count}, alpha (1/s) the first")
         super().__init__(name, config, games, platforms, team)
         self._barrier = it
         self.radius_m *= it.widened
@@ -80,7 +83,7 @@ class TextbookFilter(BatchFilter):
         p, v = _between(x), _between(state[..., L.SPEED] * e)
         i, j = self._gains[:, None, :, None], self._gains[:, None, None, :]
         alpha, *gains = np.where(ours[:, None, :], 0.5 * (i + j), i)
-        h, h_p, acts = self._barrier.jet(p, v, self.radius_m, *gains)
+        h, h_p, acts = self._barrier.of(p, v, self.radius_m, gains)
         if self._barrier.of_velocity:
             need = -alpha * h - np.where(ours, 0.0, state[..., L.SPEED])[:, None] * dot(h_p, e[:, :, None])
         else:

@@ -11,10 +11,11 @@ from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import BoolArray
 from steerclear.shield.renamed import Renamed, takes_old_keywords
 
+from ..baselines.own_filters import check_maker
 from ..baselines.registry import SHIELD, FilterMaker
 from ..statistics import upper_bound
 from .outcomes import SIDES, Columns, chunk_size, measure_chunk
-from .scenarios import draw
+from .scenarios import check_whole, draw
 from .scene import Conditions
 
 QUANTILES = np.linspace(0.0, 1.0, 101)
@@ -177,8 +178,10 @@ def measure(
     Raises:
         SteerclearError: bad input.
     """
+    check_whole("the number of encounters", n)
     if n < 1:
         raise ConfigError(f"the number of encounters is {n}; ask for at least 1")
+    check_maker(safety_filter)
     asked = conditions or Conditions()
     size = chunk_size(family, own, other, asked, seed, first)
     parts = [

@@ -24,6 +24,7 @@ from steerclear.shield.jit import Array, BoolArray, IntArray
 from steerclear.shield.platforms import layout as L
 
 from .. import oracle
+from ..baselines.own_filters import check_answer
 from ..baselines.reach import ReachFilter, mark_safe
 from ..baselines.registry import NONE, SHIELD, FilterMaker, build_filter
 from ..game_metrics import DEADLOCK_S, count_reversals, deadlocks
@@ -159,7 +160,8 @@ def inactive_columns(
     state, nominal = (of[steps][:, games].reshape(scenes.games, *of.shape[2:]) for of in (bare.state, bare.nominal))
     ours = np.broadcast_to(scenes.own, state.shape[:2]).copy()
     safe = safe_boats(scenes, state, conditions)
-    filtered = np.asarray(build_filter(safety_filter, scenes, conditions).decide(state, nominal.copy(), ours))
+    decider = build_filter(safety_filter, scenes, conditions)
+    filtered = check_answer(decider, decider.decide(state, nominal.copy(), ours), ours.shape)
     alone = safe & (filtered == nominal).all(axis=2)
     return {
         name: marks.reshape(len(steps), len(games), -1).sum(axis=(0, 2)).astype(np.float64)

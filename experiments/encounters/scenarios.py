@@ -332,11 +332,20 @@ def get_family(name: str) -> Family:
     Raises:
         ConfigError: there is none; the message names the nearest, or all.
     """
+    if not isinstance(name, str):
+        raise ConfigError(f"the family is {name!r}; give the name of one, as 'head_on'")
     if name not in FAMILIES:
         near = get_close_matches(name, FAMILIES, 1)
         hint = f"did you mean {near[0]!r}?" if near else f"choose from {', '.join(FAMILIES)}"
         raise ConfigError(f"unknown family {name!r}; {hint}")
     return FAMILIES[name]
+
+
+def check_whole(name: str, value: Any) -> None:
+    """Refuse (ConfigError) what is no whole number of at least 0, or too large to be counted in."""
+    is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not is_whole or value < 0 or value > np.iinfo(np.int64).max:
+        raise ConfigError(f"{name} is {value!r}; give a whole number, 0 or more")
 
 
 def draw(family: str, own: str, other: str, conditions: Conditions, seed: int, first: int, count: int) -> Scenes:
@@ -348,7 +357,12 @@ def draw(family: str, own: str, other: str, conditions: Conditions, seed: int, f
         SteerclearError: an unknown name, or an encounter that cannot be drawn with this radius.
     """
     kind = get_family(family)
-    if first < 0 or count < 1:
+    check_whole("first", first)
+    check_whole("count", count)
+    check_whole("seed", seed)
+    if not isinstance(conditions, Conditions):
+        raise ConfigError(f"conditions is {conditions!r}; give Conditions(radius_m=..., ...)")
+    if count < 1:
         raise ConfigError(f"encounters {first} to {first + count - 1} cannot be drawn; ask for at least one, from 0 on")
     builds = [SceneBuilder(own, other, conditions, seed, family, number) for number in range(first, first + count)]
     box = builds[0].field(kind.field_for) if kind.field_for else None

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from steerclear.shield.calls import checked_calls
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.jit import Array, IntArray
 from steerclear.shield.platforms import get_platform
@@ -77,6 +78,7 @@ def to_goals(speed_mps: float, reached_m: float) -> Array:
     return script(phase(AIM_GOALS, speed_mps), reached_m=reached_m)
 
 
+@checked_calls()
 @dataclass(frozen=True)
 class Conditions(GameConditions):
     """What holds for all encounters of a run: that of games, and ``radius_m``, the separation to keep, m.

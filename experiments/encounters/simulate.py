@@ -10,7 +10,7 @@ from warnings import warn
 
 import numpy as np
 from numpy.typing import NDArray
-from steerclear.shield.exceptions import ConfigError, FleetError
+from steerclear.shield.exceptions import FleetError
 from steerclear.shield.jit import Array, IntArray, kernel
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms import step_boat
@@ -18,6 +18,7 @@ from steerclear.shield.platforms.actuator import command_for_turn
 from steerclear.shield.platforms.usv import wrap_degrees
 from steerclear.shield.renamed import takes_old_keywords
 
+from ..baselines.own_filters import check_account, check_answer, check_decide, is_filter
 from ..baselines.registry import FilterMaker, SafetyFilter, build_filter
 from ..play.conditions import observe
 from . import scene as S
@@ -221,11 +222,12 @@ def play(scenes: Scenes, safety_filter: str | FilterMaker | SafetyFilter, condit
     in the batch.
 
     Raises:
-        SteerclearError: the filter cannot be made, says no reason or margin, or what it sends is not finite.
+        SteerclearError: the filter cannot be made, says no reason or margin, or what it sends is no finite command.
     """
     decider: Any = safety_filter
-    if isinstance(safety_filter, str) or not hasattr(safety_filter, "decide"):
-        decider = build_filter(safety_filter, scenes, conditions)
+    if not is_filter(safety_filter):
+        decider = build_filter(decider, scenes, conditions)
+    check_decide(decider)
     world, steps, shape = world_of(scenes, conditions), scenes.steps, (scenes.games, len(scenes.team))
     played = Trajectory(
         scenes=scenes,
@@ -247,16 +249,11 @@ def play(scenes: Scenes, safety_filter: str | FilterMaker | SafetyFilter, condit
         started = time.perf_counter()
         answer = decider.decide(world.seen, nominal, ours)
         played.decision_us[step] = (time.perf_counter() - started) / scenes.games * 1e6
-        filtered[:] = np.where(ours[..., None], answer, nominal)
+        filtered[:] = np.where(ours[..., None], check_answer(decider, answer, shape), nominal)
         if not np.isfinite(filtered).all():
             b, i, _ = np.argwhere(~np.isfinite(filtered))[0]
             raise FleetError(f"step {step}: the command for boat {i} of game {b} is not finite: {filtered[b, i]}")
-        if missing := [name for name in ("reason", "safety_margin_m") if not hasattr(decider, name)]:
-            raise ConfigError(
-                f"the safety filter {type(decider).__name__} has no {' and no '.join(missing)} after decide(...); give "
-                "both, (games, boats), as baselines.registry.NoFilter does"
-            )
-        played.reason[step], played.safety_margin_m[step] = decider.reason, decider.safety_margin_m
+        played.reason[step], played.safety_margin_m[step] = check_account(decider, shape)
         move(world, filtered, step)
         played.state[step + 1] = world.state
     return played

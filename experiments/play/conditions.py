@@ -19,6 +19,7 @@ from steerclear.env.core import BatchedMctf
 from steerclear.env.mctf import MctfEnv
 from steerclear.env.randomness import next_uniform
 from steerclear.env.record import absolute_commands
+from steerclear.shield.calls import checked_calls
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.fleet import Fleet
 from steerclear.shield.jit import Array, copy_row, kernel
@@ -35,6 +36,7 @@ NOISE_MEMORY_S = 2.0
 _WORDS = {"delay_s": "{:g} s delay", "noise_m": "{:g} m position noise", "current_mps": "{:g} m/s current"}
 
 
+@checked_calls()
 @dataclass(frozen=True)
 class Conditions:
     """What holds for all games of a run, with the shield and without.

@@ -171,7 +171,7 @@ def test_a_damaged_scene_is_refused(tmp_path, change, words):
 
 
 def test_encounters_are_counted_from_0_on():
-    with pytest.raises(ConfigError, match="encounters -1 to -1 cannot be drawn"):
+    with pytest.raises(ConfigError, match="first is -1; give a whole number, 0 or more"):
         draw("head_on", "heron", "heron", USUAL, 0, -1, 1)
 
 
