@@ -178,12 +178,13 @@ def _write_page(settings: EntryGames, run: Run, results: dict[str, Any], workers
         with progress(f"replay {number + 1}", 1):
             played = play_again(chosen, workers)
         if len(played) == len(chosen):
-            name, label = f"look_{number + 1}.html", f"{off['pairing']}, game {off['game']}"
-            write_replay([played[spec.key].record for spec in chosen], folder / name, f"{label}: {words}")
-            links.append({"label": f"{words}: {label}", "path": name})
+            name, against = f"look_{number + 1}.html", f"against {Path(off['opponent']).name}, game {off['game']}"
+            title = f"{Path(settings.own).name} {against}: {words}"
+            write_replay([played[spec.key].record for spec in chosen], folder / name, title)
+            links.append({"label": f"{words}: {against}", "path": name})
     links.append({"label": "all figures and every game", "path": results["files"]["report"]})
     page = replace(entry_report(rows, settings), warnings=results["warnings"], links=links)
-    say(page.write(folder / PAGE))
+    say(*(f"{tile.label}: {tile.on} {tile.unit}: {tile.note}" for tile in page.tiles), page.write(folder / PAGE), "")
 
 
 @app.command()

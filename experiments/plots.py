@@ -12,6 +12,7 @@ import re
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,7 +26,8 @@ if TYPE_CHECKING:
 else:
     Figure = Any
 
-WIDTH_IN = 6.0
+WIDTH_IN = 4.2
+"""Of a plot with names: its letters are legible on a phone, whose whole width it has, and not large elsewhere."""
 COLOURS = {
     "off": "#94a3b8", "on": "#0b8a8f", "covered": "#3b6fd4", "ink": "#0f172a", "muted": "#546276", "line": "#d8dfe8",
     "mark": "#be1893", "r1": "#e2a100", "r2": "#e2641e", "r4": "#6d5bd0", "r5": "#7a4a1e", "card": "#fefefe",
@@ -41,7 +43,10 @@ PATTERNS = {"": ("", "-"), "striped": ("||||", "--"), "dotted": ("....", ":")}
 """Hatch of an area and dash of a line, by pattern."""
 HUES = tuple(f"tab:{name}" for name in ("blue", "orange", "green", "red", "purple", "brown", "pink", "olive", "cyan"))
 """Colours of names in a scatter, in turn."""
-LABEL_LETTERS = 22
+LABEL_LETTERS, LABEL_END = 22, 13
+WORDS_LETTERS, MOST_TICKS = 40, 5
+NAMED = "whole name: "
+"""Begins the id of a label of which the whole name is to be seen by pointing at it."""
 MOST_DOTS = 600
 Labelled = Sequence[tuple[str, Sequence[tuple[str, Mapping[str, Any]]]]]
 """Groups: label, and per state its name and figure (value, low, high)."""
@@ -79,15 +84,17 @@ def text(words: object) -> str:
 
 
 def label(words: str) -> str:
-    """A group's label, its beginning left out when there is no room for it."""
-    words = text(words)
-    return words if len(words) <= LABEL_LETTERS else "…" + words[1 - LABEL_LETTERS :]
+    """A group's label: files without their folders; its middle is left out when there is no room for it."""
+    words = text(" vs ".join(Path(part).name or part for part in words.split(" vs ")))
+    if len(words) <= LABEL_LETTERS:
+        return words
+    return f"{words[: LABEL_LETTERS - LABEL_END - 1]}…{words[-LABEL_END:]}"
 
 
 def bars(groups: Labelled, axis_words: str) -> Figure:
     """Draw groups of bars (a state is a colour's name) with their intervals."""
     lines = sum(len(group) for _, group in groups)
-    canvas, axis = _canvas(0.7 + 0.21 * lines + 0.12 * len(groups))
+    canvas, axis = _canvas(0.9 + 0.21 * lines + 0.12 * len(groups))
     y, places = 0.0, []
     for _, group in groups:
         places.append(y + (len(group) - 1) / 2.0)
@@ -95,7 +102,7 @@ def bars(groups: Labelled, axis_words: str) -> Figure:
             _bar(axis, y, COLOURS[state], figure)
             y += 1.0
         y += 0.6
-    _ended(axis, places, [label(name) for name, _ in groups], axis_words)
+    _ended(axis, places, [name for name, _ in groups], axis_words)
     return canvas
 
 
@@ -129,7 +136,7 @@ def dots(
     each = max(1, math.ceil(max((len(values) for *_, values in rows), default=0) / MOST_DOTS))
     stacks = [_stacks(values[::each], most) for *_, values in rows]
     heights = [max((y for _, y in stack), default=0) + 2.0 for stack in stacks]
-    canvas, axis = _canvas(0.8 + 0.1 * sum(heights))
+    canvas, axis = _canvas(1.0 + 0.1 * sum(heights))
     floor, middles = 0.0, dict[str, list[float]]()
     for (name, state, _), stack, height in zip(rows, stacks, heights, strict=True):
         floor -= height
@@ -137,10 +144,10 @@ def dots(
         if stack:
             axis.plot(*np.array([(x, floor + y) for x, y in stack]).T, "o", ms=4.6, color=COLOURS[state], mew=0)
         axis.axhline(floor - 0.6, color=COLOURS["line"], lw=0.7)
-    words = axis_words if each == 1 else f"{axis_words} (one of {each} shown)"
+    words = axis_words if each == 1 else f"{axis_words}\n(one of {each} shown)"
     places = [-float(np.mean(values)) for values in middles.values()]
     axis.set_ylim(floor - 1.0, 0.5)
-    _ended(axis, [-p for p in places], [label(name) for name in middles], words, reference, turned=False)
+    _ended(axis, [-p for p in places], [*middles], words, reference, turned=False)
     return canvas
 
 
@@ -156,7 +163,7 @@ def _stacks(values: Sequence[float], most: float) -> list[tuple[float, int]]:
 
 def shares(groups: Sequence[tuple[str, Sequence[tuple[str, float]]]], axis_words: str) -> Figure:
     """Draw one bar per group, made of its parts (name and percent), which come in the same order everywhere."""
-    canvas, axis = _canvas(0.7 + 0.34 * len(groups))
+    canvas, axis = _canvas(0.9 + 0.34 * len(groups))
     for y, (_, parts) in enumerate(groups):
         left = 0.0
         for look, (_, percent) in zip(SERIES, parts, strict=False):
@@ -164,7 +171,7 @@ def shares(groups: Sequence[tuple[str, Sequence[tuple[str, float]]]], axis_words
             axis.barh(y, percent, 0.6, left=left, color=colour, hatch=hatch, edgecolor=COLOURS["card"], lw=0.0)
             left += percent
         axis.annotate(f"{left:.2f} %", (left, y), (4, 0), textcoords="offset points", va="center", color=COLOURS["ink"])
-    _ended(axis, list(range(len(groups))), [label(name) for name, _ in groups], axis_words)
+    _ended(axis, list(range(len(groups))), [name for name, _ in groups], axis_words)
     return canvas
 
 
@@ -176,9 +183,14 @@ def _ended(
     reference: float | None = None,
     turned: bool = True,
 ) -> None:
-    axis.set_yticks(places, names)
+    axis.set_yticks(places, [label(name) for name in names])
+    for shown, name in zip(axis.get_yticklabels(), names, strict=True):
+        shown.set_gid(f"{NAMED}{text(name)}")
     axis.tick_params(axis="y", length=0, labelcolor=COLOURS["ink"])
-    axis.set_xlabel(words, color=COLOURS["muted"])
+    axis.locator_params(axis="x", nbins=MOST_TICKS)
+    axis.set_xlabel(
+        "\n".join(line for part in words.split("\n") for line in wrap(part, WORDS_LETTERS)), color=COLOURS["muted"]
+    )
     axis.grid(axis="x", color=COLOURS["line"], lw=0.8)
     if reference is not None:
         axis.axvline(reference, color=COLOURS["mark"], ls="--", lw=1.3)
@@ -264,6 +276,7 @@ def svg(figure: Figure, words: str) -> str:
     content = buffer.getvalue()
     content = re.sub(r"<metadata>.*?</metadata>", "", content[content.index("<svg") :], flags=re.DOTALL)
     content = re.sub(r'(<svg[^>]*?) width="[^"]*"|(<svg[^>]*?) height="[^"]*"', r"\1\2", content, count=0)
+    content = re.sub(f'<g id="{NAMED}([^"]*)">', r"<g><title>\1</title>", content)
     content = content.replace("#1f77b4", COLOURS["ink"])  # of marks that were given no fill: they have no area
     for name, colour in COLOURS.items():
         content = content.replace(colour, f"var(--{name})")

@@ -16,8 +16,11 @@ from .metrics import RADII_M, REASONS, game_metrics_of, violation_column
 from .page import render, write_page
 from .play.conditions import words_of
 from .tables import (
+    AROUND,
+    BARE,
     COVERED_HEAD,
     COVERED_WORDS,
+    IN_ZIP,
     ITS_OWN,
     LEFT_HEAD,
     OWN_SHIELDS,
@@ -48,19 +51,27 @@ HINDSIGHT = (
     "how long before the hit that was still so; who let the later of both boats' last moments pass is responsible."
 )
 OF_AN_ENTRY = (
-    "The shield round the game decides ten times a second; headlines compare it with the entry alone. The shield in "
-    "the zip is what is handed in; its games are pairings of their own."
+    "The shield in the zip decides once a decision of the game; its games are pairings of their own. The shield round "
+    "the game decides ten times a second, which nothing that is handed in can do."
 )
+WAYS = {
+    BARE: ("As handed in (entry alone)", ""),
+    ITS_OWN: ("As handed in (its own shield)", ""),
+    IN_ZIP: ("With steerclear entry wrap (shield in the zip)", ""),
+    AROUND: ("Shield round the game: an upper bound", "No zip can do this: it decides before every step of motion. "),
+}
+"""Of the ways an entry is played, by their heads: the label of the headline, and what is to be known of it."""
 IMAGES = "; img-src data:"
 
 
 class Tile(NamedTuple):
-    """A headline: a number, and the one without the shield."""
+    """A headline: a number, what it counts where that is not the label, and the one without the shield."""
 
     label: str
     off: str | None
     on: str
     note: str
+    unit: str = ""
 
 
 class Plot(NamedTuple):
@@ -190,12 +201,13 @@ def game_report(results: Mapping[str, Any]) -> Report:
         settings.get("separation_m") or (settings.get("shield") or {}).get("separation_m") or RADII_M[0]
     )
     violations, games = results.get("violations") or (), results.get("games") or ()
+    is_entry = "zip_file" in settings
     beside = all(len(columns_of(pairing)) <= MOST_BESIDE for pairing in pairings)
     return Report(
         title=results.get("title") or _played(results)[0],
         subtitle=_subtitle(results, separation_m),
         warnings=results.get("warnings") or (),
-        tiles=_tiles(pairings, separation_m),
+        tiles=_way_tiles(pairings, settings, separation_m) if is_entry else _tiles(pairings, separation_m),
         links=results.get("replays") or (),
         goals=results.get("goals") or (),
         plots=_plots(pairings, games, separation_m) if games else (),
@@ -245,6 +257,10 @@ def _subtitle(results: Mapping[str, Any], separation_m: float) -> str:
 def _played(results: Mapping[str, Any]) -> tuple[str, str]:
     """Title, and words for the states of the shield that the games were played in."""
     states = set(results["settings"].get("states") or (False, True))
+    heads = [_head(one, state) for one in results["pairings"] for state in (OFF, ON) if one.get(f"games_{state}")]
+    if "zip_file" in results["settings"]:
+        ways = ", ".join(way for way in WAYS if way in heads)
+        return f"{Path(results['settings']['own']).name} and the shield", f"each start played in these ways: {ways}"
     own = any(_head(pairing, OFF) == ITS_OWN for pairing in results["pairings"])
     if len(states) > 1:
         how = "with its own shield and with ours round it" if own else "without and with the shield"
@@ -268,6 +284,44 @@ def _tiles(pairings: Sequence[Summary], separation_m: float) -> list[Tile]:
         off, on = (_overall(pairings, key, state) for state in ("off", "on"))
         tiles.append(Tile(label, None if off is None else number_text(off), number_text(on), note))
     return tiles
+
+
+def way_tiles(ways: Mapping[str, Mapping[str, float | None]], separation_m: float) -> list[Tile]:
+    """The headlines of an entry: what it does as handed in, with the shield in its zip, with one round the game.
+
+    Args:
+        ways: by the head of a way, means of a game: ``captures``, ``captures_against``, hits with ``teammates`` and
+            ``opponents``, and ``collisions`` that the game counts.
+        separation_m: distance within which two boats hit.
+    """
+    tiles = []
+    for way, means in ways.items():
+        label, more = WAYS[way]
+        hits = (means["teammates"] or 0.0) + (means["opponents"] or 0.0)
+        told = {name: number_text(value) for name, value in means.items()}
+        note = (
+            f"{told['teammates']} with teammates, {told['opponents']} with opponents, within {separation_m:g} m; "
+            f"{told['captures']} captures, {told['captures_against']} given up; the game counts "
+            f"{told['collisions']} collisions. {more}"
+        )
+        tiles.append(Tile(label, None, number_text(hits), note.strip(), "hits a game"))
+    return tiles
+
+
+def _way_tiles(pairings: Sequence[Summary], settings: Summary, separation_m: float) -> list[Tile]:
+    """The same of all games that were played in a way."""
+    keys = {f"{kind}s": violation_column(kind, separation_m) for kind in ("teammate", "opponent")}
+    keys |= {key: key for key in ("captures", "captures_against", "collisions")}
+    found: dict[str, list[Summary]] = {}
+    for one in pairings:
+        for state in (OFF, ON):
+            if one.get(f"games_{state}"):
+                found.setdefault(_head(one, state), []).append(one)
+    means = {}
+    for way in (name for name in WAYS if name in found):
+        state = ON if way == AROUND else OFF
+        means[way] = {name: _overall(found[way], key, state) for name, key in keys.items()}
+    return way_tiles(means, separation_m)
 
 
 def _overall(pairings: Sequence[Summary], key: str, state: str) -> float | None:

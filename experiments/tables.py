@@ -28,6 +28,8 @@ COLUMNS = {
 LEFT_HEAD, COVERED_HEAD = "on, left to the game", "on, covered"
 IN_ZIP, ITS_OWN = OWN_SHIELDS = "shield in the zip", "its own shield"
 """Heads of games without a shield round them whose boats have one all the same, in their entry."""
+BARE, AROUND = "entry alone", "shield round the game"
+"""Heads of an entry's games beside `IN_ZIP`: no shield, and one that decides ten times a second."""
 STATE_WORDS = (
     "Left to the game: boats that the game drives (tagged, out of bounds) are not shielded, as in a real game and a "
     "wrapped zip; covered: they are."

@@ -14,10 +14,10 @@ from steerclear.policies.submissions.stage import Stage
 from ..ablation import DIFFERENCES, AblationSettings
 from ..metrics import check, game_goals, violation_column
 from ..play.spec import MatchSpec
-from ..report import Report, Section
+from ..report import Report, Section, way_tiles
 from ..runner import Experiment
 from ..statistics import paired_difference
-from ..tables import IN_ZIP, Table, interval_text
+from ..tables import AROUND, BARE, IN_ZIP, Table, interval_text
 from ..words import count_text
 from ..workers import Row
 from .wrap import game_spec, own_files, shielded_files, write_zip
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 PAGE, ZIP = "entry.html", "shielded.zip"
-BARE, AROUND = "entry alone", "shield round the game"
-"""What a figure is of: no shield, that of the zip that is handed in, or one that decides ten times a second."""
 SUMS = ("captures", "captures_against", "teammates", "opponents", "collisions")
 HEADS = [
     *("opponent", "games", "captures", "given up", "change of the net, a game"),
@@ -150,13 +148,15 @@ def entry_report(rows: Sequence[Row], settings: EntryGames) -> Report:
 
     groups = by_opponent(rows, settings)
     body = [_line(Path(name).name, games, settings.seed) for name, games in groups.items()]
+    together = [pd.concat(games) for games in zip(*groups.values(), strict=True)]
     if len(body) > 1:
-        together = [pd.concat(games) for games in zip(*groups.values(), strict=True)]
         body.append(_line("all together", together, settings.seed))
+    means = [{column: float(games[column].mean()) for column in SUMS} for games in together if len(games)]
     words = (OF_ZIP if settings.zip_file else "") + HIT.format(radius=settings.separation_m)
     return Report(
         f"{Path(settings.own).name} and the shield",
         f"{settings.preset}, the shield keeps {settings.separation_m:g} m: {settings.how_many()}, from the same seeds.",
+        tiles=way_tiles(dict(zip(settings.ways(), means, strict=False)), settings.separation_m),
         sections=[
             Section(f"Sums of all games, {' → '.join(settings.ways())}", [Table("", HEADS, body)], words, wide=True)
         ],
@@ -166,7 +166,7 @@ def entry_report(rows: Sequence[Row], settings: EntryGames) -> Report:
 def _line(name: str, ways: Sequence[pd.DataFrame], seed: int) -> list[str]:
     """Row of the table: totals of games that were played in every way."""
     changes = [paired_difference(ways[0]["net"], games["net"], seed) for games in ways[1:] if len(games)]
-    sums = [" → ".join(f"{games[column].sum():g}" for games in ways) for column in SUMS]
+    sums = ["\u00a0→\u00a0".join(f"{games[column].sum():g}" for games in ways) for column in SUMS]
     change = " → ".join(interval_text(asdict(one)) for one in changes) or "-"
     return [name, str(len(ways[0])), *sums[:2], change, *sums[2:]]
 

@@ -11,6 +11,12 @@ function element(tag, properties = {}, ...children) {
 /** How many things there are: 1 hit, 2 hits. */
 const countText = (count, one) => `${count} ${one}${count === 1 ? "" : "s"}`;
 
+/** Long names without their folders and their middle, so that what stands behind them is seen on a phone, too. */
+function shortened(words) {
+  const name = (word) => word.length > 18 ? `${word.slice(0, 8)}…${word.slice(-9)}` : word;
+  return words.replace(/[^\s,:]+/g, (word) => name(word.split("/").pop() || word));
+}
+
 /** Whether a game is for flags; an encounter has none, nor halves of a field. */
 const hasFlags = (game) => game.meta.catch_radius_m > 0;
 
@@ -38,7 +44,8 @@ class Pane {
     this.games = games;
     this.player = player;
     this.chooser = element("select", { ariaLabel: "game" });
-    games.forEach((game, k) => this.chooser.append(element("option", { value: k, textContent: game.title })));
+    games.forEach(({ title }, k) =>
+      this.chooser.append(element("option", { value: k, textContent: shortened(title), title })));
     this.score = element("span", { className: "score" });
     this.badges = element("span");
     this.field = element("canvas", { className: "field" });
@@ -62,6 +69,7 @@ class Pane {
   show(index) {
     this.game = this.games[index];
     this.chooser.value = String(index);
+    this.chooser.title = this.game.title;
     this.timelineKey = "";
     const { meta } = this.game;
     const badge = (kind, ...parts) => element("span", { className: `badge ${kind}` }, ...parts);

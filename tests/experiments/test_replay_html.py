@@ -180,15 +180,16 @@ def test_the_pages_own_reader_agrees(game_record):
 
 PANE = """
 const game = (catchRadius, seed) => ({ meta: { catch_radius_m: catchRadius, seed } });
-console.log(JSON.stringify([countText(1, "boat"), countText(6, "boat"), hasFlags(game(10)), hasFlags(game(0))]));
+const long = shortened("easy – /home/us/our_long_entry_of_2026_final.zip, shield off");
+console.log(JSON.stringify([countText(1, "boat"), countText(6, "boat"), hasFlags(game(10)), hasFlags(game(0)), long]));
 """
 
 
 @pytest.mark.skipif(NODE is None, reason="the page's own words are made in node where there is one")
-def test_the_page_counts_in_words_and_knows_a_game_from_an_encounter():
+def test_the_page_counts_in_words_knows_a_game_from_an_encounter_and_cuts_no_state_off():
     pane = (files("steerclear.experiments") / "templates" / "replay_pane.js").read_text() + PANE
     answer = subprocess.run([NODE, "-e", pane], capture_output=True, text=True, check=True)
-    assert json.loads(answer.stdout) == ["1 boat", "6 boats", True, False]
+    assert json.loads(answer.stdout) == ["1 boat", "6 boats", True, False, "easy – our_long…final.zip, shield off"]
 
 
 def test_an_encounter_is_named_by_its_filter_and_no_seed_is_made_up():

@@ -109,6 +109,31 @@ def test_plots_without_data_and_with_long_labels_are_still_plots():
     assert len(plots.label("x" * 80)) == plots.LABEL_LETTERS
 
 
+def test_long_names_lose_their_middle_and_are_whole_in_the_title(results, tmp_path):
+    name = "/home/us/our_very_long_entry_of_2026_final.zip vs a&b.zip"
+    assert plots.label("/tmp/shielded.zip vs medium") == "shielded.zip vs medium"
+    short = plots.label(name)
+    assert short.startswith("our_very…")
+    assert short.endswith(".zip vs a&b.zip"[-13:])
+    results["pairings"][0]["pairing"] = name
+    results["games"] = [{**one, "pairing": one["pairing"].replace("medium vs easy", name)} for one in results["games"]]
+    for plot in plots_in(write_report(results, tmp_path / "report.html").read_text()):
+        titles = [part.text for part in plot.iter() if part.tag.endswith("title")]
+        assert name in titles
+        assert short in [part.text for part in plot.iter() if part.tag.endswith("text")]
+
+
+def test_letters_of_a_plot_are_legible_on_a_phone(results, tmp_path):
+    """A page of 390 px leaves a plot 324 px; the widest plot is drawn so that its letters have 9 px there."""
+    plots_shown = plots_in(write_report(results, tmp_path / "report.html").read_text())
+    for plot in plots_shown:
+        width = float(plot.get("viewBox").split()[2])
+        styles = [part.get("style") for part in plot.iter() if part.tag.endswith("text")]
+        sizes = [float(re.search(r"font-size: ([\d.]+)px", style)[1]) for style in styles]
+        assert sizes
+        assert min(sizes) * 324.0 / width >= 9.0
+
+
 def test_goals_and_figures_fit_their_cards_on_any_screen(results, tmp_path):
     """On a phone a goal's name stands above its figures; five columns of figures have a line of the page each."""
     text = write_report(results, tmp_path / "two.html").read_text()

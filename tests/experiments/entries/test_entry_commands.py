@@ -101,6 +101,17 @@ def test_a_report_is_a_page_with_the_games_to_look_at(write_entry):
     page = Path("out/entry.html").read_text()
     assert "Sums of all games" in page
     assert "hold" in page
+    first = done.stdout.splitlines()[:3]
+    assert [line.partition(":")[0] for line in first] == [
+        "As handed in (entry alone)",
+        "With steerclear entry wrap (shield in the zip)",
+        "Shield round the game",
+    ]
+    report = Path("out/report.html").read_text()
+    heads = [report.index(words) for words in ("As handed in", "With steerclear entry wrap", "an upper bound")]
+    assert heads == sorted(heads)
+    assert heads[-1] < report.index("Goals")
+    assert "What the shield changes" not in report
     links = [name for name in ("look_1.html", "report.html") if f'href="{name}"' in page]
     assert "report.html" in links
     assert all(Path("out", name).exists() for name in links)
@@ -173,6 +184,20 @@ def test_figures_of_the_page_are_of_games_played_in_every_way_and_names_are_text
     for words in (*figures, "&lt;them&gt;"):
         assert words in page, words
     assert "<them>" not in page
+    heads = [page.index(words) for words in ("As handed in", "Shield round the game: an upper bound", "Sums of all")]
+    assert heads == sorted(heads), "what is handed in is read first"
+    assert ("entry wrap (shield in the zip)" in page[heads[0] : heads[1]]) is bool(zip_file)
+
+
+def test_headlines_of_an_entry_are_means_of_each_way_the_bare_one_first():
+    told = {"own": "us", "opponents": ("<them>",), "games": 4, "shield": {"separation_m": 4.0}}
+    more = [row(0, False, 4, opponents=2, own="s.zip"), row(1, False, 0, mates=3, own="s.zip")]
+    tiles = entry_report([*ROWS, *more], EntryGames(preset="mctf2026", zip_file="s.zip", **told)).tiles
+    assert [(tile.off, tile.on, tile.unit) for tile in tiles] == [
+        (None, hits, "hits a game") for hits in ("3.00", "2.50", "0.50")
+    ]
+    assert "1.50 with teammates, 1.00 with opponents, within 4 m; 2.00 captures, 0.00 given up" in tiles[1].note
+    assert "No zip can do this" in tiles[2].note
 
 
 def test_games_to_look_at_are_chosen_once_each():
