@@ -29,13 +29,14 @@ from .result_files import check_new, make_folder
 from .tables import goals_table, number_text, titled
 
 FILTER = ("--filter", "--guard")
+SEPARATION = ("--separation", "--radius")
 
 
 @dataclass(frozen=True)
 class SceneOptions:
     """Conditions of scenes."""
 
-    radius: Annotated[float, o.option("M", "Separation to keep, m.")] = 2.5
+    radius: Annotated[float, o.option("M", "Separation to keep, m.", *SEPARATION)] = 2.5
     delay: Annotated[float, o.option("S", "From own command to effect, s, in whole steps, rounded up.")] = 0.0
     noise: Annotated[float, o.option("M", "Bound on the error of positions seen, m.")] = 0.0
     current: Annotated[float, o.option("M/S", "Speed of a current; the filter is told it, not where to.")] = 0.0
@@ -76,7 +77,8 @@ def encounters(
     filters = tuple(dict.fromkeys(name for text in safety_filter or ["shield"] for name in parse_filters(text)))
     if scene:
         held = {"--platform": platform != "heron,surveyor", "--family": family != "all", "--n": n != 1000}
-        held |= {f"--{name}": value != getattr(SceneOptions, name) for name, value in vars(scenes).items()}
+        for name, value in vars(scenes).items():
+            held[SEPARATION[0] if name == "radius" else f"--{name}"] = value != getattr(SceneOptions, name)
         unused = {"--jobs": where.jobs is not None, "--resume": where.resume, "--json": where.json_file is not None}
         _refuse(held | {"--seed": seed != 0}, "a scene file holds its own; leave it out, or edit the file")
         _refuse(unused, "scenes are played one after another and leave no results; leave it out")
@@ -201,7 +203,7 @@ def attack(
     scenes: SceneOptions,
     where: SceneRunOptions,
 ) -> None:
-    """Search for opponents that get within the radius although it could be kept; keep what is found as scenes.
+    """Search for opponents that get within the separation although it could be kept; keep what is found as scenes.
 
     Exit status: 0 done, 1 an avoidable violation with the shield on, 2 bad input, 130 interrupted.
     """

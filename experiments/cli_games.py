@@ -51,7 +51,7 @@ MOST_GAMES = 100_000
 QUICK_GAMES, QUICK_TIME_S, QUICK_CUP_TIME_S = 4, 300.0, 120.0
 OFF_WORDS = "the shield is off; add --shield"
 HITS_WORDS = (
-    f"A hit is an entry into the radius: one stay within {RADII_M[1]:g} m may hold several\ninto {RADII_M[0]:g} m."
+    f"A hit is an entry into that distance: one stay within {RADII_M[1]:g} m may hold several\ninto {RADII_M[0]:g} m."
 )
 STEERING = (
     "you steer the ringed boat, while the window has the keyboard: up or w ahead, left and right or a and d turn, "

@@ -40,16 +40,22 @@ class BoatOptions:
 
 
 OtherMay = Annotated[str, o.option("MODE", "What the other boat may do: worst-case or cooperative.")]
-Radius = Annotated[float, o.option("M", "Separation radius, m.")]
+Separation = Annotated[float, o.option("M", "Separation, m.", "--separation", "--radius")]
 
 
 @app.command()
 def solve(
     boats: BoatOptions,
     other_may: OtherMay = "worst-case",
-    radius: Annotated[
+    separation: Annotated[
         list[float] | None,
-        o.option("M", "Separation radius to check the table for, m; may be repeated.", default="2.5, 4"),
+        o.option(
+            "M",
+            "Separation to check the table for, m; may be repeated.",
+            "--separation",
+            "--radius",
+            default="2.5, 4",
+        ),
     ] = None,
     out_file: Annotated[
         Path | None, o.option("FILE", "File to write, a new one.", "--out", default="the user's cache folder"), NEW
@@ -62,12 +68,12 @@ def solve(
 ) -> None:
     """Solve the game of two boats and write its value table.
 
-    One table serves every separation radius; --radius says for which its grid and its promise are checked.
+    One table serves every separation; --separation says for which its grid and its promise are checked.
     Ctrl-C keeps the state: the same command then goes on from there.
     """
     problem = problem_of(boats.own, boats.other, other_may, horizon_s=horizon)
     problem = coarser(problem, 2.0) if quick else problem
-    radii, runs = tuple(radius) if radius else RADII_M, RUNS // 20 if quick else RUNS
+    radii, runs = tuple(separation) if separation else RADII_M, RUNS // 20 if quick else RUNS
     check_radii(problem, radii)
     target = out_file or F.cache_folder() / f"{problem.name}.npz"
     check_new(target, "--out")
@@ -93,7 +99,7 @@ def show(
     other_may: OtherMay = "worst-case",
     file: Annotated[Path | None, o.option("FILE", "A table file instead of the installed one.")] = None,
 ) -> None:
-    """Show a table's card: how it was made, how good it is, the areas in which a radius cannot be kept."""
+    """Show a table's card: how it was made, how good it is, the areas in which a separation cannot be kept."""
     if file is None:
         table = F.load_table(boats.own, boats.other, other_may)
     else:
@@ -109,22 +115,22 @@ def show(
 
 @app.command()
 def compare(
-    boats: BoatOptions, radius: Radius = 2.5, shield_set: o.ShieldSet = None, json_file: o.JsonFile = None
+    boats: BoatOptions, separation: Separation = 2.5, shield_set: o.ShieldSet = None, json_file: o.JsonFile = None
 ) -> None:
-    """Compare the set the shield cannot promise to save with the reachability set, both of --radius.
+    """Compare the set the shield cannot promise to save with the reachability set, both of --separation.
 
     Exit status: 0 the shield's is nowhere more than 1.15 times as large, and nowhere calls safe more than 2 % of what
     the table calls lost; 1 somewhere it does, 2 bad input.
     """
     values, started = F.load_table(boats.own, boats.other, "worst-case"), time.perf_counter()
-    check_radii(problem_of(boats.own, boats.other), (radius,))
+    check_radii(problem_of(boats.own, boats.other), (separation,))
     given = o.key_values(shield_set, "--shield-set")
-    config = sets_config(radius, given)
+    config = sets_config(separation, given)
     with progress("sets", len(places(values))) as notice:
         pairs = compare_sets(values, config, notice)
-    settings = {"own": boats.own, "other": boats.other, "radius_m": radius, "shield": given}
+    settings = {"own": boats.own, "other": boats.other, "radius_m": separation, "shield": given}
     content = P.sets_content(settings, pairs, looks_up(values, config), started)
-    _show(boats, radius, P.SETS_COLUMNS, pairs, content)
+    _show(boats, separation, P.SETS_COLUMNS, pairs, content)
     if content["looked_up"]:
         out().print(" ".join(P.LOOKED_UP.split()))
     write_json(json_file, content)
@@ -143,7 +149,7 @@ def _show(
 @app.command()
 def play(
     boats: BoatOptions,
-    radius: Radius = 2.5,
+    separation: Separation = 2.5,
     shield_set: o.ShieldSet = None,
     folder: o.Out = None,
     jobs: o.Jobs = None,
@@ -158,16 +164,16 @@ def play(
     latter, and from no position tried beyond a boat was reached; 1 somewhere they are, or one was; 2 bad input, 130
     interrupted.
     """
-    check_radii(problem_of(boats.own, boats.other), (radius,))
-    experiment = played_experiment(boats.own, boats.other, radius, o.key_values(shield_set, "--shield-set"))
-    folder = folder or Path("results") / f"reach_play_{boats.own}_{boats.other}_{radius:g}"
+    check_radii(problem_of(boats.own, boats.other), (separation,))
+    experiment = played_experiment(boats.own, boats.other, separation, o.key_values(shield_set, "--shield-set"))
+    folder = folder or Path("results") / f"reach_play_{boats.own}_{boats.other}_{separation:g}"
     workers = processes_of(jobs)
     with progress("sets", len(experiment.jobs)) as notice:
         run = execute(experiment, folder, workers, resume, notice)
     run.end()
     sets = [PlayedSet(**row) for row in run.rows]
     content = P.played_content(run.head(), sets)
-    _show(boats, radius, P.PLAYED_COLUMNS, sets, content)
+    _show(boats, separation, P.PLAYED_COLUMNS, sets, content)
     run.write(content)
     say(folder / RESULTS_FILE)
     write_json(json_file, content)

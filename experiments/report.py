@@ -44,11 +44,13 @@ MOST_ROWS, MOST_VIOLATIONS, MOST_BESIDE = 600, 200, 3
 """Rows of a table of games, of one of hits, and columns of figures of two tables side by side."""
 STYLES = {"green": "good", "red": "bad", "yellow": "muted"}
 NOTE = (
-    "Whiskers and brackets are 95 % intervals. A hit is one entry of two boats into the radius, however long it lasts."
+    "Whiskers and brackets are 95 % intervals. A hit is one entry of two boats into the distance it is counted at, "
+    "however long it lasts."
 )
 HINDSIGHT = (
-    "With every other boat's actual track, could own commands of the last 30 s have kept the radius? 'Last moment' is "
-    "how long before the hit that was still so; who let the later of both boats' last moments pass is responsible."
+    "With every other boat's actual track, could own commands of the last 30 s have kept the separation? 'Last "
+    "moment' is how long before the hit that was still so; who let the later of both boats' last moments pass is "
+    "responsible."
 )
 OF_AN_ENTRY = (
     "The shield in the zip decides once a decision of the game; its games are pairings of their own. The shield round "

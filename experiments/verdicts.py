@@ -162,7 +162,7 @@ HEADS = (
         "game-controlled",
         "avoidable",
         "unavoidable",
-        "started inside the radius",
+        "started inside the separation",
         "not judged",
         "avoidable per game",
     ),

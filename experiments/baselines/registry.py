@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 NONE, SHIELD, REACH = "none", "shield", "reach"
 GIVEN = {
-    "separation_m": "--radius",
+    "separation_m": "--separation",
     "position_error_m": "--noise",
     "delay_s": "--delay",
     "current_mps": "--current",

@@ -147,7 +147,7 @@ REPLAY = {
     "actions[].ticks": "turns of the loop in which it was in effect",
     "closest_teammate_m": "with --judge: closest distance of two own boats, m",
     "closest_opponent_m": "with --judge: closest distance of an own boat to another, m",
-    "violations_teammate": "with --judge: entries of two own boats into the separation radius",
-    "violations_opponent": "with --judge: entries of an own boat and another into the separation radius",
+    "violations_teammate": "with --judge: entries of two own boats into the separation",
+    "violations_opponent": "with --judge: entries of an own boat and another into the separation",
     "files[]": "what was written",
 }

@@ -261,7 +261,7 @@ KEYS = {
     "searches[].closest_m": "least distance that any of its opponents came to an own boat, m",
     "searches[].history[]": "the least distance after each generation, m",
     "searches[].tried": "opponents played",
-    "searches[].violated": "of those, how many got within the radius",
+    "searches[].violated": "of those, how many got within the separation",
     "searches[].judged[].*": "violations the analysis judged: distance, entries, safety margin at the start, verdicts",
     "searches[].scene": "file with the avoidable violation found; null without one",
     "failed[].*": "search that could not be run, and why",

@@ -119,7 +119,7 @@ class SceneBuilder:
             x, y = self.place_in(box)
             if self.is_clear(x, y, gap_m):
                 return x, y
-        raise ConfigError(f"no room for {len(self.state) + 1} boats {gap_m:.1f} m apart; choose a smaller --radius")
+        raise ConfigError(f"no room for {len(self.state) + 1} boats {gap_m:.1f} m apart; choose a smaller --separation")
 
     def place_in(self, box: Box) -> Point:
         """Any place in the box."""

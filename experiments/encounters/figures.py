@@ -69,7 +69,7 @@ _SAFE = "of sampled states that are safe by the value tables, how many commands 
 _TIME = "time to the first goal over that without a filter; never there counts as the whole length"
 _NEVER = "own boats that had not reached their first goal by the end but do without a filter, %"
 _DEAD = "encounters in which two teammates that want to move stood still for over 10 s"
-_VIOLATED = "encounters in which an own boat came within the radius of any boat"
+_VIOLATED = "encounters in which an own boat came within the separation of any boat"
 _SETTLED = "encounters with violations of which none was avoidable"
 _CAUTIOUS = f"{_UPPER}; what was not judged counts as avoidable"
 _CHANGED = "share of the own boats' steps whose command was changed, %"
@@ -200,7 +200,7 @@ WORST = {
     "number": ("number", "number of the encounter: with family, platforms and seed it gives the scene"),
     "variant": ("variant", "which of its variants (sudden turns) was the worst"),
     "closest_m": ("closest, m", "closest distance, m"),
-    "violations": ("violations", "entries into the radius"),
+    "violations": ("violations", "entries into the separation"),
     "avoidable": ("avoidable", "of those judged, how many were avoidable"),
     "last_preventable_s": ("until, s before", "how long before it an own boat could still avoid it, s; null: never"),
     "responsible": ("last chance let pass by", "whose command let the last chance pass; null when not judged"),

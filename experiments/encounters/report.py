@@ -26,11 +26,11 @@ Cells = Sequence[Cell]
 MOST_M = 15.0
 """Distances beyond this are cut off: nobody is in danger there, m."""
 SHOWN = {"filter": "filter", **{key: one.label for key, one in FIGURES.items() if one.label}}
-CONDITIONS = {"radius_m": "radius {:g} m", "delay_s": "delay {:g} s", "noise_m": "position error {:g} m"}
+CONDITIONS = {"radius_m": "separation {:g} m", "delay_s": "delay {:g} s", "noise_m": "position error {:g} m"}
 CONDITIONS |= {"current_mps": "current {:g} m/s"}
 NOTE = (
-    "An encounter has a violation when an own boat comes within the radius of any boat. It is avoidable when the own "
-    "boat's commands could have kept the radius. '≤ at 95 %' is the one-sided upper limit of the probability of an "
+    "An encounter has a violation when an own boat comes within the separation of any boat. It is avoidable when the "
+    "own boat's commands could have kept it. '≤ at 95 %' is the one-sided upper limit of the probability of an "
     "avoidable violation (Clopper and Pearson); those not judged count as avoidable. An encounter starts outside the "
     "unavoidable set when the shield's safety margin at the first decision is at least 0 for every own boat, whatever "
     "filter plays. Changes are means over the changed steps; time to the goal is against the same scenes without a "
@@ -111,7 +111,7 @@ def _plot(family: str, cells: Cells, settings: Mapping[str, Any]) -> Plot:
         for cell in cells
         if cell["filter"] != NONE
     ]
-    words = "share that came closer than that, m; dashed: radius"
+    words = "share that came closer than that, m; dashed: the separation"
     series = [(name, colour, *distribution(quantiles)) for name, colour, quantiles in curves]
     figure = plots.curves(series, settings["conditions"]["radius_m"], words)
     legend = [(colour, name) for name, colour, _ in curves]
@@ -138,7 +138,7 @@ HEADS: dict[str, tuple[str, Any]] = {
     "hit": ("with the filter", "violated"),
     "avoid": ("of these avoidable in hindsight (?: not judged)", _avoidable_text),
     "<=%": ("95 % upper limit of the avoidable ones, % of the encounters", lambda c: _text(c, "avoidable_upper")),
-    "unav": ("unavoidable, or begun inside the radius", lambda c: f"{c['unavoidable'] + c['started_inside']}"),
+    "unav": ("unavoidable, or begun inside the separation", lambda c: f"{c['unavoidable'] + c['started_inside']}"),
     "out%": (
         "with violations, % of those that started outside the unavoidable set",
         lambda c: number_text(100.0 * c["violations_outside"] / c["started_outside"] if c["started_outside"] else None),

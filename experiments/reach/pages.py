@@ -39,8 +39,8 @@ PLAYED_COLUMNS = {
     "played": "{0.played:,}",
     "lost beyond": "{0.tried_lost} of {0.tried:,}",
 }
-SETS_WORDS = f"""Positions of an opponent from which the radius is not sure to be kept, by area: where the shield's
-safety margin is negative, and where the worst-case value table is below the radius. Both boats at full thrust; the
+SETS_WORDS = f"""Positions of an opponent from which the separation is not sure to be kept, by area: where the shield's
+safety margin is negative, and where the worst-case value table is below the separation. Both boats at full thrust; the
 heading is the opponent's relative to the own one, 180° is head-on. "Missed" is the area that the table calls lost and
 the shield calls safe, also as a share of the table's set: of each such position one of the two is wrong. The shield's
 pursuers are strategies, the table's opponent is the worst that its grid and horizon can tell
@@ -51,13 +51,13 @@ A set much larger than the table's costs freedom, one that misses positions cost
 LOOKED_UP = """The shield looks opponents up in this very table, so its set is the table's at a margin: the ratio is
 what the margin costs, and that nothing is missed says nothing. --shield-set opponent_model=turning_circle compares
 manoeuvres instead."""
-PLAYED_WORDS = f"""Found by playing, to the radius, where [unsafe_sets.md](unsafe_sets.md) tells what the shield
-*promises*. Every position of the opponent whose worst-case value is below the radius counts as lost, as nobody can
+PLAYED_WORDS = f"""Found by playing, to the separation, where [unsafe_sets.md](unsafe_sets.md) tells what the shield
+*promises*. Every position of the opponent whose worst-case value is below the separation counts as lost, as nobody can
 save the boat there. From all of a value up to {BAND_M:g} m above it games are played with the shield as it comes, and
 one in {BEYOND} of those beyond, on all bearings, is tried. The boat's policy wants straight on at top speed, or
 straight at the opponent; the opponent does what the table calls worst, steers for the meeting point, or at the boat.
-A position is lost when the boats come within the radius in any of these six games, looked at every 0.1 s, which last
-as long as the table looks ahead, at most {LONGEST_S:g} s. Both boats begin at full thrust; the heading is the
+A position is lost when the boats come within the separation in any of these six games, looked at every 0.1 s, which
+last as long as the table looks ahead, at most {LONGEST_S:g} s. Both boats begin at full thrust; the heading is the
 opponent's relative to the own one, 180° is head-on. *Reach* is the reachability set, *lost* what is lost of the
 positions *played* beside it, *ratio* both by the former, *lost beyond* how many of those tried beyond are. *By table*
 is the ratio of a boat that has no shield and no wants, but steers as the value table says is best, at top speed: what

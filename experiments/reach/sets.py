@@ -49,16 +49,16 @@ MANNERS = (GREEDY, LEAD, PURE)
 WANTS = AHEAD, AT_IT = 0, 1
 """What the boat's policy wants: straight on at top speed, or straight at the opponent."""
 NOT_COMPARED = {
-    "separation_m": "both sets are of the radius given with --radius",
-    "buffer_m": "both sets are of the radius given with --radius, without buffer",
-    "position_error_m": "the value table takes positions as exact; widen both sets with --radius",
-    "delay_s": "the value table knows no delay; leave it out, or widen both sets with --radius",
+    "separation_m": "both sets are of the separation given with --separation",
+    "buffer_m": "both sets are of the separation given with --separation, without buffer",
+    "position_error_m": "the value table takes positions as exact; widen both sets with --separation",
+    "delay_s": "the value table knows no delay; leave it out, or widen both sets with --separation",
 }
 NOT_PLAYED = {
-    "separation_m": "the sets are of the radius given with --radius",
+    "separation_m": "the sets are of the separation given with --separation",
     "dt_s": "boats move, and tables are stepped, by 0.1 s",
-    "delay_s": "the value table knows no delay; widen the sets with --radius",
-    "position_error_m": "the value table takes positions as exact; widen the sets with --radius",
+    "delay_s": "the value table knows no delay; widen the sets with --separation",
+    "position_error_m": "the value table takes positions as exact; widen the sets with --separation",
     "coordination": "games are played in batches, which decide for whole teams",
 }
 """Settings of the shield under which the sets would answer another question, and what to do instead."""
