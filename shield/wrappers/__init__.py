@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ..extras import install_command
+from .game_facts import GameFacts
 from .games_shield import games_shield
 from .parallel import ShieldedParallelEnv
 from .policy import ShieldedCallable, ShieldedTeamPolicy
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from .vector_sb3 import MctfVecEnv as MctfVecEnv
 
 __all__ = [
+    "GameFacts",
     "GameReader",
     "MctfVectorEnv",
     "ShieldedCallable",

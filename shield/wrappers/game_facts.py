@@ -22,13 +22,21 @@ _WHY = {"separation_m": "counts collisions", "obstacle_clearance_m": "has boats 
 
 
 class GameFacts(NamedTuple):
-    """Settings of a game."""
+    """Settings of a game that a shield relies on.
 
-    dt_s: float  # length of a substep, in which the boats move under one command, s
-    radius_m: Array  # (n,) radius of each boat, m; two boats collide when no farther apart than the sum
-    team: IntArray  # (n,) team number of each boat
-    obstacles: bool  # the game has obstacles, which a boat hits by its radius
-    decision_s: float = 0.0  # time that the boats move for one action of a policy, s; 0: the same as dt_s
+    Attributes:
+        dt_s: length of a substep, in which the boats move under one command, s.
+        radius_m: (n,) radius of each boat, m; two boats collide when no farther apart than the sum; 0: never.
+        team: (n,) team number of each boat, 0 (blue) or 1 (red).
+        obstacles: whether the game has obstacles, which a boat hits by its radius.
+        decision_s: time that the boats move for one action of a policy, s; 0: the same as ``dt_s``.
+    """
+
+    dt_s: float
+    radius_m: Array
+    team: IntArray
+    obstacles: bool
+    decision_s: float = 0.0
 
     @property
     def moves(self) -> int:
