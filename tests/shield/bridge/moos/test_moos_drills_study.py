@@ -1,4 +1,4 @@
-"""The drills, each held against the time that docs/moos.md promises; seconds of the boat's time."""
+"""The drills, each held against the time that docs/studies/moos.md promises; seconds of the boat's time."""
 
 import pytest
 from drills import DRILLS
