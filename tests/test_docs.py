@@ -75,6 +75,27 @@ def test_blocks_of_code_end_on_a_line_of_their_own_and_a_page_has_a_next_step():
             assert re.search(r"^(Next: |## (\d+\. )?On from here)", text, flags=re.MULTILINE), page
 
 
+MOST_LINES, WIDEST = 3_000, 120
+"""Lines of all pages together, without studies and without parts that are made of the code; characters of a line."""
+
+
+def typed_lines(text):
+    """Lines of a page that somebody wrote."""
+    return re.sub(r"^<!-- (\w+) -->\n.*?^<!-- /\1 -->\n", "", text, flags=re.MULTILINE | re.DOTALL).splitlines()
+
+
+def test_pages_are_short_and_their_lines_not_dense():
+    pages = {page.name: typed_lines(page.read_text(encoding="utf-8")) for page in DOCS.glob("*.md")}
+    assert sum(map(len, pages.values())) <= MOST_LINES, {name: len(lines) for name, lines in pages.items()}
+    for name in pages:
+        prose = re.sub(r"\$\$.*?\$\$", "", text_of(DOCS / name), flags=re.DOTALL).splitlines()
+        assert [line for line in prose if len(line) > WIDEST and not line.startswith(("|", "    "))] == [], name
+
+
+def test_parts_made_of_the_code_are_no_lines_of_a_page():
+    assert typed_lines("a\n<!-- x -->\nb\n<!-- /x -->\nc\n") == ["a", "c"]
+
+
 def test_a_link_and_an_anchor_are_found():
     assert LINK.findall("see [a](b.md#c) and ![d](e.png)") == ["b.md#c", "e.png"]
     assert "one-decision" in anchors_of(DOCS / "shield.md")
