@@ -191,9 +191,6 @@ def deploy(
     if demo.demo:
         policies.check(demo.opponents)
         demo_text(demo.link)
-    else:
-        given = {f"--{name}": value != getattr(DemoOptions, name) for name, value in vars(demo).items()}
-        o.check_used(given, "no boats are simulated; add --demo")
     if policy != MOOS_POLICY:
         policies.check(policy)
         say_what_runs((policy,), what.trust, warn)

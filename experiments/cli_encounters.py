@@ -76,17 +76,10 @@ def encounters(
     """
     filters = tuple(dict.fromkeys(name for text in safety_filter or ["shield"] for name in parse_filters(text)))
     if scene:
-        held = {"--platform": platform != "heron,surveyor", "--family": family != "all", "--n": n != 1000}
-        for name, value in vars(scenes).items():
-            held[SEPARATION[0] if name == "radius" else f"--{name}"] = value != getattr(SceneOptions, name)
-        unused = {"--jobs": where.jobs is not None, "--resume": where.resume, "--json": where.json_file is not None}
-        _refuse(held | {"--seed": seed != 0}, "a scene file holds its own; leave it out, or edit the file")
-        _refuse(unused, "scenes are played one after another and leave no results; leave it out")
         finish(play_scene_files(scene, filters, where.folder, not no_judge))
         return
     families = _names(family, "--family", f"all, or {', '.join(FAMILIES)}")
     families = tuple(FAMILIES) if families == ("all",) else families
-    o.check_used({"--noise": filters == (NONE,) and scenes.noise != 0.0}, "no filter looks; add --filter shield")
     settings = Settings(platform_pairs(platform), families, filters, n, seed, scenes.given(), not no_judge)
     run = where.run(settings.experiment())
     results = results_of(run)
@@ -97,13 +90,6 @@ def encounters(
         where.copy(results)
     run.end()
     finish(not any(goal["met"] is False and goal["limit"] == 0.0 for goal in results["goals"]))
-
-
-def _refuse(given: dict[str, bool], why: str) -> None:
-    """Options of drawn encounters say nothing about scenes."""
-    named = ", ".join(option for option, is_given in given.items() if is_given)
-    if named:
-        raise ConfigError(f"{named} beside --scene: {why}")
 
 
 def _names(text: str, option: str, such_as: str) -> tuple[str, ...]:

@@ -49,7 +49,6 @@ FEW_GAMES = 20
 MOST_GAMES = 100_000
 """Games of a pairing at most: all are listed before the first is played."""
 QUICK_GAMES, QUICK_TIME_S, QUICK_CUP_TIME_S = 4, 300.0, 120.0
-OFF_WORDS = "the shield is off; add --shield"
 HITS_WORDS = (
     f"A hit is an entry into that distance: one stay within {RADII_M[1]:g} m may hold several\ninto {RADII_M[0]:g} m."
 )
@@ -109,7 +108,6 @@ def play(
     if KEYBOARD in names:
         warn(STEERING)
     human = look.window or KEYBOARD in names
-    o.check_used({"--speed": look.speed != WindowOptions.speed and not human}, "no window is shown; add --window")
     if human:
         result = play_match(spec, lambda env: not (env.renderer and env.renderer.window_closed), "human", look.speed)
     else:
@@ -130,8 +128,6 @@ def _spec_of(
 ) -> MatchSpec:
     """The one game that options ask for."""
     asked, rules = shield.given(), game.given()
-    if not who.shield:
-        o.check_used(o.of_a_shield(shield, water, who.no_shield_autopilot), OFF_WORDS)
     return MatchSpec(
         game.preset,
         who.own,
@@ -176,12 +172,10 @@ def evaluate(
 
     Exit status: 0 done, 2 bad input or a policy that never played, 130 interrupted.
     """
-    if not shield:
-        unused = o.of_a_shield(shield_options, water, no_shield_autopilot)
-        o.check_used(unused | {"separation_m": False}, OFF_WORDS)  # there hits are counted anyhow
     states = {"states": (shield,), "shield_autopilot": not no_shield_autopilot}
     settings = settings_of(policy, game, shield_options, how, water, many, **states)
-    end_run(*run_games("evaluate", settings, where, many.quick), where)
+    about = o.counting_words(shield_options, shield)
+    end_run(*run_games("evaluate", settings, where, many.quick, about), where)
 
 
 @command()
@@ -238,9 +232,12 @@ def settings_of(
 
 
 def run_games(
-    name: str, settings: AblationSettings, where: o.RunOptions, quick: bool = False
+    name: str, settings: AblationSettings, where: o.RunOptions, quick: bool = False, about: str = ""
 ) -> tuple[dict[str, Any], Run]:
-    """Play all games of the settings, write everything: the content of results.json, and the run, to be ended."""
+    """Play all games of the settings, write everything: the content of results.json, and the run, to be ended.
+
+    ``about`` is said once nothing refuses them.
+    """
     workers = where.workers()
     if not 1 <= settings.games <= MOST_GAMES:
         raise ConfigError(f"--games must be at least 1 and at most {MOST_GAMES:,}; got {settings.games:,}")
@@ -254,7 +251,8 @@ def run_games(
     if made is not None and made.shielded:  # games without ours are not games without a shield
         words = "has a shield in it: off means that one alone, on that one and ours; play the bare entry instead"
         warn(f"{settings.own} {words}")
-    run = where.run(settings.experiment(name))
+    experiment = settings.experiment(name)
+    run = where.run(replace(experiment, about=about) if about else experiment)
     replay = None
     if not run.interrupted:
         try:
@@ -365,10 +363,8 @@ def tournament(
     if who.quick:
         settings = replace(settings, rules={"max_time_s": QUICK_CUP_TIME_S, **settings.rules})
     shielded = set(settings.states) - {cup.OFF}
-    if not shielded:  # hits are counted at the separation anyhow
-        unused = dict.fromkeys(kept.given(), True) | {"separation_m": False}
-        o.check_used(unused, "no team is shielded; add --shield all")
-    experiment, workers = settings.experiment(), where.workers()
+    experiment = replace(settings.experiment(), about=o.counting_words(kept, bool(shielded)))
+    workers = where.workers()
     config = MatchSpec.of_job(experiment.jobs[0]).config()
     check_shield(settings.shield, config)
     check_run(settings.teams, config, settings.shield if shielded else None, warn, trust=settings.trust)

@@ -39,6 +39,7 @@ from .sim_boats.demo import demo_fleet, off_platform
 from .sim_boats.faults import Plan, parse_incident
 from .sim_boats.fleet import Hulls
 from .sim_boats.report import approaches_table, boats_table, content_of, state_line, verdicts_table
+from .unused import check_used
 
 LOOK_S = 0.1
 """How often the terminal and the plan of faults are looked at, machine's s."""
@@ -141,6 +142,10 @@ def sim_boats(
     if (fleet is None) != how.demo:
         raise ConfigError("give a FLEET.yaml, or --demo for the one that comes with the package")
     file = demo_fleet() if fleet is None else load_fleet(fleet)
+    if not file.agent_ids:
+        of_games = {"--record": record is not None, "--opponents": how.opponents != SimulatedOptions.opponents}
+        of_games |= {"--no-wait": how.no_wait, "--random-start": how.random_start}
+        check_used(of_games, f"{fleet} has no game; leave it out, or add the game to the file")
     boats, started = _boats(file, how, sea, radio, hulls, record is not None), time.perf_counter()
     try:
         plan = Plan([parse_incident(text) for text in hulls.fault or []], boats)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import json
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -67,7 +66,8 @@ class ShieldOptions:
     """What a shield keeps, and from whom; any other setting."""
 
     separation: Annotated[
-        float | None, option("M", "Radius the shield keeps, m.", default="at which the game counts")
+        float | None,
+        option("M", "Separation the shield keeps and hits are counted at, m.", default="at which the game counts"),
     ] = None
     profile: Annotated[str | None, option("NAME", f"Whom opponents are taken for: {', '.join(PROFILES)}.")] = None
     shield_set: ShieldSet = None
@@ -192,16 +192,12 @@ class RunOptions:
         write_json(self.json_file, results)
 
 
-def check_used(given: Mapping[str, bool], why: str) -> None:
-    """Refuse (ConfigError) options that are given and change nothing; ``why`` says so, and what to do."""
-    if unused := [name for name, is_given in given.items() if is_given]:
-        raise ConfigError(f"{', '.join(unused)} would change nothing: {why}")
-
-
-def of_a_shield(shield: ShieldOptions, water: WaterOptions, no_autopilot: bool) -> dict[str, bool]:
-    """Options that only a shield heeds, and whether each is given; `check_used` takes them where there is none."""
-    given = dict.fromkeys(shield.given(), True)
-    return given | {"--noise": water.noise != 0.0, "--no-shield-autopilot": no_autopilot}
+def counting_words(shield: ShieldOptions, is_kept: bool) -> str:
+    """Say that a separation that no shield keeps is only the distance at which hits are counted; else nothing."""
+    metres = shield.given().get("separation_m")
+    if is_kept or metres is None:
+        return ""
+    return f"the shield is off: {metres:g} m is only the distance at which hits are counted; add --shield to keep it"
 
 
 def key_values(pairs: list[str] | None, option: str) -> dict[str, Any]:

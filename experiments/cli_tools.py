@@ -153,10 +153,6 @@ def render(
     several = to.suffix.lower() == ".html"
     if len(games) > 1 and not several:
         raise ConfigError(f"only a replay (.html) takes several games; give one record for {to.suffix}")
-    ending = to.suffix.lower()
-    o.check_used({"--at": at is not None and ending != ".png"}, f"{ending} shows the whole game; name a .png")
-    film = ending in (".mp4", ".gif")
-    o.check_used({"--speed": speed != 4.0 and not film}, f"{ending} is no film; name an .mp4 or .gif")
     path = write_replay(games, to) if several else save_record(games[0], to, at, speed)
     say(path)
     settings = {"records": [str(record) for record in records], "to": str(to), "at": at, "speed": speed}

@@ -10,6 +10,7 @@ import time
 import typing
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from enum import IntEnum
 from typing import Any, NoReturn
 
@@ -22,6 +23,7 @@ from typer.core import TyperCommand, TyperOption
 from .cli_files import as_typed, check_files, hints_of
 from .runner import Interrupted as Interrupted
 from .terminal import SafeConsole
+from .unused import check_rules
 from .workers import JobFault, fault_words, interrupted_by_signals, machine_words
 
 MAX_WIDTH = 100
@@ -129,6 +131,15 @@ _MADE = set[Callable[..., Any]]()
 """What `command` made."""
 
 
+_TYPED = ContextVar("typed", default=("", dict[str, str]()))
+"""The command that is run and, by name, its arguments that were typed as they were, until it begins."""
+
+
+def _name_of(ctx: Any) -> str:
+    """A command's name, without the program's."""
+    return " ".join(ctx.command_path.split()[1:])
+
+
 class OnceCommand(TyperCommand):
     """A command whose options count once, but for those that may be repeated, and whose help fits one screen.
 
@@ -142,7 +153,7 @@ class OnceCommand(TyperCommand):
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write the help, of the options that most users want."""
-        name, hidden = " ".join(ctx.command_path.split()[1:]), [] if ctx.meta.get(ALL) else self._rare
+        name, hidden = _name_of(ctx), [] if ctx.meta.get(ALL) else self._rare
         more = f"--help-all shows {len(hidden)} more options.\n\n" if hidden else ""
         self.epilog = f"{more}Example: {EXAMPLES[name]}" if name in EXAMPLES else None
         for option in hidden:
@@ -164,6 +175,9 @@ class OnceCommand(TyperCommand):
             args = ["--help"]
         self._check_values(ctx, args)
         _, _, given = self.make_parser(ctx).parse_args(args=list(args))
+        words = {word.partition("=")[0] for word in args}
+        spelled = {str(one.name): next((name for name in one.opts if name in words), one.opts[0]) for one in given}
+        _TYPED.set((_name_of(ctx), spelled))
         for option in given:
             if isinstance(option, TyperOption) and not option.multiple and given.count(option) > 1:
                 joined = ", values joined by commas" if "," in (option.metavar or "") else ""
@@ -210,6 +224,7 @@ def command(**defaults: Any) -> Made:
             logging.captureWarnings(True)
             typed = dict(given)
             try:
+                check_options(given)
                 check_files(guarded, given)
                 for name, group in groups.items():
                     given[name] = group(**{field.name: given.pop(field.name) for field in dataclasses.fields(group)})
@@ -236,6 +251,12 @@ def command(**defaults: Any) -> Made:
         return guarded
 
     return decorate
+
+
+def check_options(given: dict[str, Any]) -> None:
+    """Refuse (ConfigError) options that were typed and change nothing beside the others; see `unused.RULES`."""
+    (name, typed), _ = _TYPED.get(), _TYPED.set(("", {}))
+    check_rules(name, typed, given)
 
 
 def _options_of(

@@ -5,11 +5,13 @@ import shlex
 from pathlib import Path
 
 import pytest
+import typer
 from commands import run
 from steerclear.env.record import save
 from steerclear.experiments import cli
 from steerclear.experiments import cli_train as train
 from steerclear.experiments.console import ExitCode
+from steerclear.experiments.unused import RULES
 from steerclear.policies.entrants import learned
 from steerclear.shield.extras import install_command
 
@@ -18,6 +20,16 @@ MISTAKES = [
     for line in (Path(__file__).parents[1] / "data" / "mistakes.txt").read_text(encoding="utf-8").splitlines()
 ]
 """A command line, and words that what is said of it holds."""
+
+ALONE = """version: 1
+team: blue
+field: {origin: {latitude_deg: 42.0, longitude_deg: -71.0}, size_m: [160, 80]}
+geofence: {xmin_m: 0, ymin_m: 0, xmax_m: 160, ymax_m: 80}
+boats:
+  - {name: blue_1, team: blue, platform: heron, link: {kind: mavlink, address: "udpin:127.0.0.1:14550", system_id: 1}}
+shield: {separation_m: 2.5, position_error_m: 0.0}
+"""
+"""A boat that plays no game."""
 
 
 @pytest.fixture
@@ -36,6 +48,7 @@ def workplace(tmp_path, monkeypatch, game_record):
     save(game_record, "game.npz")
     demo = Path(cli.__file__).parent / "templates" / "demo_fleet.yaml"
     Path("fleet.yaml").write_text(demo.read_text(encoding="utf-8"))
+    Path("alone.yaml").write_text(ALONE)
     return tmp_path
 
 
@@ -68,3 +81,35 @@ def test_the_table_covers_every_command():
     named = {line.split()[0] for line, _ in MISTAKES}
     assert {info.name or info.callback.__name__.replace("_", "-") for info in cli.app.registered_commands} <= named
     assert len(MISTAKES) >= 80
+
+
+def test_every_rule_of_options_that_change_nothing_has_a_line_and_names_arguments_there_are():
+    """The lines above refuse each option of each rule by its own words."""
+    said = [(line, words) for line, words in MISTAKES if "would change nothing" in words]
+    for rule in RULES:
+        for name in rule.commands:
+            spelled = {option.name: option.opts[0] for option in command_of(name).params}
+            assert {*rule.options} <= {*spelled}, f"{name} has no such options"
+            lines = [words for line, words in said if line.startswith(f"{name} ")]
+            assert any(words.partition(": ")[2] and words.partition(": ")[2] in rule.why for words in lines), rule
+
+
+def command_of(name):
+    """A command, or one of a group."""
+    found = typer.main.get_command(cli.app)
+    for part in name.split():
+        found = found.commands[part]
+    return found
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["evaluate hold --opponents hold --games 1", "tournament --teams hold,easy --shield off"],
+)
+def test_what_is_only_a_distance_to_count_at_is_said_once_nothing_else_is_wrong(line, workplace):
+    words = "the shield is off: 3 m is only the distance at which hits are counted; add --shield to keep it"
+    line = [*line.split(), "--separation", "3", "--max-time", "1", "--judge", "none", "--jobs", "1"]
+    assert words not in run(*line, "--penalty", "nan").stderr
+    done = run(*line)
+    assert done.exit_code == ExitCode.OK, done.output
+    assert done.stderr.count(words) == 1

@@ -61,7 +61,7 @@ def test_a_card_that_is_none_is_refused_and_a_preset_that_nobody_knows_is_named(
     [
         ("evaluate", "{}", "--no-shield", "--opponents", "hold", "--games", "2", "--jobs", "1", "--judge", "none"),
         ("play", "--own", "hold", "--opponent", "{}"),
-        ("tournament", "--teams", "hold,{}", "--quick", "--shield", "off", "--jobs", "1"),
+        ("tournament", "--teams", "hold,{}", "--shield", "off", "--jobs", "1"),
     ],
 )
 def test_commands_say_it_once(words, weights, tmp_path):
