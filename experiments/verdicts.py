@@ -77,7 +77,7 @@ def helpless(verdict: Verdict, disabled: np.ndarray | None) -> bool:
 def judge_game(
     log: StateLog, params: np.ndarray, record: Record, side: int, motion: Motion = AT_ONCE
 ) -> list[dict[str, Any]]:
-    """Judge the separation violations of a game that a team's boats were in, at the record's separation radius.
+    """Judge the separation violations of a game that a team's boats were in, at the record's separation.
 
     Args:
         log: the game's states.

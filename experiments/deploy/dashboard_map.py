@@ -21,7 +21,7 @@ _BLANK = 0x2800
 COLOURS = ("bright_blue", "bright_red", "bright_white")  # colours of blue, red and boats outside the game
 SYMBOLS = (
     ("small circle and line", "a boat in its team's colour, and the way it makes in 2 s"),
-    ("large circle", "around a boat of ours: its separation radius, where nobody else should be"),
+    ("large circle", "around a boat of ours: its separation, where nobody else should be"),
     ("yellow circle", "how wrong the boat's place may be, where that is more than 0.5 m"),
     ("grey circles", "obstacles, and the circle of our flag, that our boats keep out of"),
     ("solid box, dotted box", "the field, and the geofence"),

@@ -62,7 +62,7 @@ def judge(
         boats: parameters of the n boats: `Boat`s or the simulator's rows (n, 38).
         own: index of the judged boat.
         step: index of the first state inside the radius.
-        radius_m: separation radius, m; exactly the radius counts as inside.
+        radius_m: separation, m; exactly that distance counts as inside.
         dt_s: length of a step, s.
         other: the boat it came too close to; default: the nearest at ``step``.
         settings: look-back times and search resolution.

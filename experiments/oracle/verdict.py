@@ -174,7 +174,7 @@ class Verdict:
         own: index of the judged boat.
         other: index of the boat it came too close to.
         step: index of the first state inside the radius.
-        radius_m: separation radius, m.
+        radius_m: separation, m.
         outcome: see `Outcome`.
         last_step: the latest state at which a command could still prevent the violation; None if there is none.
         last_preventable_s: time from that state to the violation, s; None if there is none.
