@@ -93,7 +93,8 @@ class HullOptions:
     )
     off: Annotated[float, o.option("SHARE", "Our boats' parameters are off by this, 0.2: 20 %.")] = 0.0
     fault: Annotated[
-        list[str] | None, o.option("BOAT:KIND@S[+S]", "Fault at a time, for a time; may be repeated.", "--fault")
+        list[str] | None,
+        o.option("BOAT:KIND@S[+S][,OPTION=X]", "Fault at a time, for a time; may be repeated.", "--fault"),
     ] = None
 
 

@@ -6,10 +6,11 @@ A planned fault is written ``BOAT:KIND@TIME[+DURATION][,OPTION=VALUE...]``.
 from __future__ import annotations
 
 import difflib
+import inspect
 import json
 import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,7 @@ from steerclear.shield.exceptions import ConfigError
 from .autopilot import Autopilot
 from .hull import Order, Steer
 from .sensing import Bend, Radio, Snapshot
+from .vehicle import NOT_OFFERED, Mode
 
 if TYPE_CHECKING:
     from .fleet import SimFleet
@@ -62,11 +64,8 @@ class Faults:
 
     def start(self, kind: str, now_s: float, duration_s: float = math.inf, **options: Any) -> None:
         """Begin a fault, see `KINDS`; `ConfigError` for an unknown kind or option, or one that cannot be used."""
-        check_kind(kind)
-        try:
-            fault = KINDS[kind](self, **options)
-        except TypeError as error:
-            raise ConfigError(f"fault {kind!r}: {error}") from None
+        check_fault(kind, duration_s, options)
+        fault = KINDS[kind](self, **options)
         if fault is not None:
             self.active[kind] = replace(fault, ends_s=now_s + duration_s)
             self._combine()
@@ -109,6 +108,23 @@ def check_kind(kind: str) -> None:
         near = difflib.get_close_matches(kind, KINDS, n=1)
         hint = f"did you mean {near[0]!r}?" if near else f"faults are {', '.join(KINDS)}"
         raise ConfigError(f"unknown fault {kind!r}; {hint}")
+
+
+def check_fault(kind: str, duration_s: float, options: Mapping[str, Any]) -> None:
+    """Raise `ConfigError` unless there is such a kind, it takes these options, and can last that long, s."""
+    check_kind(kind)
+    known = list(inspect.signature(KINDS[kind]).parameters)[1:]
+    for name, value in options.items():
+        if name not in known:
+            raise ConfigError(f"fault {kind!r} has no option {name!r}; it has {', '.join(known) or 'none'}")
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+            raise ConfigError(f"fault {kind!r}: {name} is {value!r}; give a number")
+    if kind in AT_ONCE and duration_s != math.inf:
+        what = f"fault {kind!r} happens at once and has no duration ({duration_s:g} s were given)"
+        raise ConfigError(f"{what}; leave it out{AT_ONCE[kind]}")
+    if kind == "mode" and options.get("number", Mode.HOLD) not in OFFERED:
+        offered = ", ".join(f"{int(mode)} {mode.name}" for mode in OFFERED)
+        raise ConfigError(f"fault 'mode': a simulated boat has no mode {options['number']}; it has {offered}")
 
 
 def _drop(packet: bytes) -> list[tuple[float, bytes]]:
@@ -174,7 +190,9 @@ def _out_of_order(boat: Faults, spread_s: float = 0.3) -> Fault:
 def _duplicate(boat: Faults, copies: int = 2, spread_s: float = 0.2) -> Fault:
     """Every packet comes `copies` (2) times within `spread_s` (0.2)."""
     return Fault(
-        down=lambda packet: [(spread_s * boat.random.random() if k else 0.0, packet) for k in range(max(copies, 1))]
+        down=lambda packet: [
+            (spread_s * boat.random.random() if k else 0.0, packet) for k in range(max(int(copies), 1))
+        ]
     )
 
 
@@ -191,7 +209,7 @@ def _corrupt(boat: Faults, share: float = 0.5) -> Fault:
 
 
 def _restart(boat: Faults) -> None:
-    """The autopilot boots again; parameters stay, modes and streams do not."""
+    """The autopilot boots again, once; parameters stay, modes and streams do not."""
     boat.autopilot.reboot_wanted = True
 
 
@@ -202,12 +220,12 @@ def _power_off(boat: Faults) -> Fault:
 
 
 def _mode(boat: Faults, number: int = 4) -> None:
-    """A pilot's hand: mode `number` (4, HOLD), until he gives it back."""
+    """A pilot's hand, once: mode `number` (4, HOLD). He gives the boat back by another, later: `number=15`, GUIDED."""
     boat.autopilot.vehicle.set_mode(number, boat.autopilot.now_s)
 
 
 def _disarm(boat: Faults) -> None:
-    """A pilot's hand: motors off, until he arms it."""
+    """A pilot's hand, once: motors off, until somebody arms it."""
     boat.autopilot.vehicle.armed = False
 
 
@@ -219,6 +237,14 @@ KINDS: dict[str, Callable[..., Fault | None]] = {
     )
 }
 """Fault factories by kind. Their docstrings are shown in the documentation of the boats."""
+
+AT_ONCE = {
+    "restart": "",
+    "mode": ", and plan another change of mode for the end, such as BOAT:mode@SECONDS,number=15 (GUIDED)",
+    "disarm": "",
+}
+"""Faults that happen at once, so that they have no duration, and how to end them."""
+OFFERED = tuple(mode for mode in Mode if mode not in NOT_OFFERED)
 
 
 def faults_page() -> str:
@@ -255,6 +281,7 @@ def parse_incident(text: str) -> Incident:
         options = {name: json.loads(value) for name, _, value in pairs}
     except ValueError:
         raise ConfigError(f"the fault {text!r} holds something that is not a number") from None
+    check_fault(found["kind"], lasts_s, options)
     return Incident(found["boat"], found["kind"], at_s, lasts_s, options)
 
 

@@ -11,7 +11,7 @@ from steerclear.env.record import load
 from steerclear.experiments.cli import app
 from steerclear.experiments.deploy.demo import demo_file, free_ports
 from steerclear.experiments.sim_boats import RadioSettings, SimBoat, SimFleet
-from steerclear.experiments.sim_boats.faults import Incident, faults_page, parse_incident
+from steerclear.experiments.sim_boats.faults import AT_ONCE, KINDS, Incident, faults_page, parse_incident
 from steerclear.experiments.sim_boats.fleet import boats_of
 from steerclear.shield.bridge.clock import ManualClock
 from steerclear.shield.bridge.fleet_file import parse_fleet
@@ -191,6 +191,16 @@ def test_each_fault_does_what_its_kind_says_and_is_over_when_cleared(kind, optio
             assert after[-1][2] > before[-1][2] + 3.0
 
 
+def test_faults_that_happen_at_once_are_those_that_nothing_ends():
+    fleet = alone()
+    try:
+        for kind in KINDS:
+            fleet.fault("b", kind)
+        assert set(fleet.boats["b"].faults.active) == set(KINDS) - set(AT_ONCE)
+    finally:
+        fleet.close()
+
+
 def test_a_compass_that_is_off_turns_the_boat_and_not_what_it_tells():
     fleet = alone()
     fleet.fault("b", "compass", offset_deg=30.0)
@@ -209,7 +219,15 @@ def test_a_compass_that_is_off_turns_the_boat_and_not_what_it_tells():
         ("c", "jump", {}, "no simulated boat"),
         ("b", "jmp", {}, "did you mean 'jump'"),
         ("b", "xyz", {}, "faults are"),
-        ("b", "jump", {"far": 1}, "far"),
+        ("b", "jump", {"far": 1}, "no option 'far'; it has distance_m, course_deg"),
+        ("b", "restart", {"far": 1}, "it has none"),
+        ("b", "jump", {"distance_m": "30"}, "distance_m is '30'; give a number"),
+        ("b", "jump", {"distance_m": math.nan}, "give a number"),
+        ("b", "mode", {"number": 99}, "no mode 99; it has 0 MANUAL"),
+        ("b", "mode", {"number": 11}, "no mode 11"),
+        ("b", "mode", {"duration_s": 10.0}, "happens at once and has no duration .*number=15"),
+        ("b", "disarm", {"duration_s": 10.0}, "happens at once and has no duration"),
+        ("b", "restart", {"duration_s": 10.0}, "happens at once and has no duration"),
     ],
 )
 def test_faults_that_do_not_exist_are_refused(boat, kind, options, match):
@@ -269,6 +287,9 @@ def test_planned_faults_are_read():
         "blue_1", "jump", 60.0, 10.0, {"distance_m": 5, "course_deg": 0}
     )
     assert parse_incident("b:late@2").lasts_s == float("inf")
+    for wrong in ("b:mode@1+10", "b:jump@1,far=3", "b:jump@1,distance_m=[1]", "b:mode@1,number=99"):
+        with pytest.raises(ConfigError, match="fault"):
+            parse_incident(wrong)  # before the run, not when it is due
     for wrong in ("jump@60", "b:jump", "b:jump@x", "b:jump@1,a=x y", "b:jump@1.2.3", ""):
         with pytest.raises(ConfigError):
             parse_incident(wrong)
