@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from mcap.exceptions import EndOfFile, McapError
-from mcap.records import Channel, Chunk, Footer, Message, Schema
+from mcap.records import Channel, Chunk, DataEnd, Footer, Message, Schema
 from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
 from zstandard import ZstdError
 
@@ -29,6 +29,8 @@ from .recorder import HEADER_TOPIC, LINK_TOPIC, LOG_TOPIC, TICK_TOPIC
 LOG = logging.getLogger(__name__)
 
 CHECKSUM_TO_END = 12  # bytes of a file's checksum of its index and of what ends the file after it
+DATA_END_BYTES = 13  # of the record that ends the data and holds the checksum of all bytes before it
+BLOCK_BYTES = 1 << 20
 LARGEST_RECORD = 64 << 20  # longer records than this are damage, bytes
 _DAMAGE = (McapError, CRCValidationError, ZstdError, struct.error, UnicodeDecodeError, MemoryError, OverflowError)
 _PART = re.compile(r"(?P<first>.+)\.part[1-9]\d*(?P<ending>\.[^.]*)")
@@ -161,13 +163,28 @@ def _object(message: Message) -> Mapping[str, Any]:
     return found
 
 
-def _index_holds(file: IO[bytes], footer: Footer) -> bool:
-    """Whether the bytes after the data, up to the checksum in the footer itself, are those that were written."""
+def _unlike_checksums(file: IO[bytes], data_end: DataEnd | None, footer: Footer) -> str:
+    """Which bytes of a file that was closed are not those that were written, by its two checksums; empty if all are.
+
+    The first covers everything before the record that ends the data: also what stands between chunks, which no
+    checksum of a chunk and no link covers. Logs of 0.9.0 and before have none: it is 0. The second covers the rest.
+    """
     end = file.seek(0, os.SEEK_END) - CHECKSUM_TO_END
-    if not 0 < footer.summary_start <= end:
-        return False
-    file.seek(footer.summary_start)
-    return zlib.crc32(file.read(end - footer.summary_start)) == footer.summary_crc
+    data_bytes = footer.summary_start - DATA_END_BYTES
+    if not 0 < data_bytes <= end or _checksum(file, footer.summary_start, end) != footer.summary_crc:
+        return "bytes of its index, after the chain's end, are not as they were written"
+    if data_end is None or data_end.data_section_crc not in (0, _checksum(file, 0, data_bytes)):
+        return "some of its bytes are not as they were written, by the checksum of all"
+    return ""
+
+
+def _checksum(file: IO[bytes], begin: int, end: int) -> int:
+    """The CRC-32 of the bytes from ``begin`` to before ``end``."""
+    file.seek(begin)
+    checksum = 0
+    for at in range(begin, end, BLOCK_BYTES):
+        checksum = zlib.crc32(file.read(min(BLOCK_BYTES, end - at)), checksum)
+    return checksum
 
 
 def read_records(file: IO[bytes], tell: Tell) -> Iterator[Any]:
@@ -177,7 +194,7 @@ def read_records(file: IO[bytes], tell: Tell) -> Iterator[Any]:
         file: at its beginning.
         tell: gets a text about each part that cannot be read; nothing is raised for them.
     """
-    closed, footer = False, None
+    closed, footer, data_end = False, None, None
     try:
         for item in StreamReader(file, emit_chunks=True, record_size_limit=LARGEST_RECORD).records:
             if isinstance(item, Chunk):
@@ -191,10 +208,12 @@ def read_records(file: IO[bytes], tell: Tell) -> Iterator[Any]:
                 closed = isinstance(item, Footer)
                 footer = item if isinstance(item, Footer) else footer
                 yield item
+            elif isinstance(item, DataEnd):
+                data_end = item
         if file.read(1):
             tell("after its end more bytes follow, which were not read")
-        elif footer is not None and not _index_holds(file, footer):
-            tell("bytes of its index, after the chain's end, are not as they were written")
+        elif footer is not None and (text := _unlike_checksums(file, data_end, footer)):
+            tell(text)
     except EndOfFile:
         return  # cut off: the footer that was not there tells
     except _DAMAGE as error:

@@ -50,7 +50,12 @@ class McapFile(Store[Tick | Line]):
         super().__init__(disk)
         self._header = header
         self._chain = Chain(header.chain, key)
-        self._writer = Writer(disk, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)  # type: ignore[arg-type]
+        self._writer = Writer(
+            disk,  # type: ignore[arg-type]
+            chunk_size=CHUNK_BYTES,
+            compression=CompressionType.ZSTD,
+            enable_data_crcs=True,  # of all bytes, those between chunks included
+        )
         self._writer.start(profile="", library="steerclear")
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}

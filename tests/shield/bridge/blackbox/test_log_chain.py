@@ -11,6 +11,7 @@ from forged_logs import read_records, write_records
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from logged_runs import Encounter, header_of
+from mcap.opcode import Opcode
 from steerclear.shield.bridge.blackbox import LogReader, McapWriter
 from steerclear.shield.bridge.blackbox.format import tick_to_json
 from steerclear.shield.bridge.blackbox.hash_chain import Chain, ChainHead
@@ -136,6 +137,41 @@ def test_an_altered_byte_after_the_end_of_the_chain_is_told(log, tmp_path, befor
         assert len(list(sound.ticks())) == len(list(reader.ticks())) == STEPS
         assert (sound.damage, sound.complete) == ([], True)
         assert reader.damage or not reader.complete, "a record that is taken for none looks like a cut"
+
+
+def offsets_between_chunks(path):
+    """Where the bytes of each record lie that is in no chunk, from the file's first to the end of its data."""
+    data, at, found = path.read_bytes(), 8, []
+    while data[at] != Opcode.DATA_END:
+        length = 9 + int.from_bytes(data[at + 1 : at + 9], "little")
+        found += [] if data[at] == Opcode.CHUNK else range(at, at + length)
+        at += length
+    return [*found, *range(at, at + 13)]
+
+
+@settings(max_examples=150, deadline=None, derandomize=True)
+@given(data=st.data(), change=st.integers(1, 255))
+def test_an_altered_byte_anywhere_in_a_closed_log_is_told(log, tmp_path_factory, data, change):
+    altered = bytearray(log.read_bytes())
+    between = data.draw(st.booleans())
+    offset = data.draw(st.sampled_from(offsets_between_chunks(log)) if between else st.integers(0, len(altered) - 1))
+    altered[offset] ^= change
+    path = tmp_path_factory.mktemp("altered") / "run.mcap"
+    path.write_bytes(altered)
+    try:
+        reader = LogReader(path)
+    except LogError:
+        return
+    with reader:
+        list(reader.entries())
+        assert reader.damage or reader.chain.breaks or not reader.complete
+
+
+def test_a_log_without_a_checksum_of_all_bytes_is_read_as_one_of_0_9_0(log, tmp_path):
+    path = write_records(tmp_path / "run.mcap", read_records(log))
+    with LogReader(path) as reader:
+        assert len(list(reader.ticks())) == STEPS
+        assert (reader.damage, reader.complete, reader.chain.holds) == ([], True, True)
 
 
 def test_a_link_where_the_change_is_names_it(log, tmp_path):
