@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from importlib.util import find_spec
 
 import numpy as np
 from steerclear.shield import Shield, ShieldConfig
@@ -40,11 +41,55 @@ def compile_encounters(safety_filter: str = "shield", judge: bool = True) -> Non
     measure("rammer_1", safety_filter, n=1, judge=judge)
 
 
+def compile_boats() -> None:
+    """Compile what a run with simulated boats needs: runner, policy, referee and boats; nothing without its extra."""
+    if not all(map(find_spec, BOATS_NEED)):
+        return
+    from .deploy.player import Orders, Player, cast_of
+    from .deploy.quiet import warm_up
+    from .deploy.referee import Umpire, game_config, player_names
+    from .sim_boats import SimBoat, SimFleet
+    from .sim_boats.demo import demo_fleet
+    from .sim_boats.hull import STEP_S
+
+    fleet = demo_fleet()
+    warm_up(fleet)
+    Player(Orders(cast_of(fleet), "medium")).warm_up()
+    config, names = game_config(fleet), player_names(fleet)
+    Umpire(config, names)
+    boats = [
+        SimBoat(name, fleet.platform_of[name], fleet.team_of[name], address=None, policy="medium") for name in names
+    ]
+    water = SimFleet(boats, preset=config.replace(dt_s=STEP_S))
+    try:
+        water.play()
+        water.advance(SHORT_S)
+    finally:
+        water.close()
+
+
+def compile_fit() -> None:
+    """Compile what fitting a boat's model needs; nothing without its extra."""
+    if not all(map(find_spec, BOATS_NEED)):
+        return
+    from .fit.fitting import AHEAD, EVERY
+    from .fit.models import MODELS, errors_of
+    from .fit.runs import Run
+
+    run = Run.of("none", 0.0, np.zeros((2 * AHEAD, 4)), np.zeros((2 * AHEAD, 2)))
+    for model in MODELS.values():
+        errors_of(model.platform(model.starts()[0], "any", 2.0).pack(), run, 0.1, EVERY, AHEAD)
+
+
+SHORT_S = 0.4  # boats are simulated for so long, s
+BOATS_NEED = ("pymavlink", "pymap3d", "mcap", "pydantic")  # modules of the extra "boats"
 PARTS: dict[str, Callable[[], object]] = {
     "the shield": compile_shield,
     "the shield, each boat by itself": lambda: Shield(ShieldConfig(coordination="per_boat")).warm_up(),
     "the game": compile_game,
     "the judge": compile_judge,
+    "boats": compile_boats,
+    "fits of boats": compile_fit,
     "encounters": compile_encounters,
     "the reachability filter": partial(compile_encounters, "reach", judge=False),
 }

@@ -215,6 +215,7 @@ class Player:
 
     def warm_up(self) -> None:
         """Play one step of an unused game, so that compilation and lazy imports happen before the first snapshot."""
+        Observer(self._cast).show(Snapshot(0, 0.0, np.zeros((len(self._cast.names), 4))))
         if self._cast.ours:
             self._begin()
             self._ask()
