@@ -103,7 +103,10 @@ def chase(params: Array, pursuer: Array, prey: Array, lead: bool) -> float:
         dx += math.sin(heading) * prey[L.SPEED] * time
         dy += math.cos(heading) * prey[L.SPEED] * time
     error = wrap_degrees(math.degrees(math.atan2(dx, dy)) - pursuer[L.HEADING])
-    return min(max(error / turn_at_full_thrust(params, pursuer, 1.0), -1.0), 1.0)
+    turn = turn_at_full_thrust(params, pursuer, 1.0)
+    if turn == 0.0:  # a boat that needs way to turn, and loses all of it at full rudder
+        return 0.0
+    return min(max(error / turn, -1.0), 1.0)
 
 
 @kernel

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from steerclear.shield.exceptions import TableError
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.registry import get_platform
 from steerclear.shield.tables.areas import area_m2, reach_ahead_m
-from steerclear.shield.tables.duel import PURE, duel
+from steerclear.shield.tables.duel import PURE, chase, duel
 from steerclear.shield.tables.files import SHIPPED, Card, check_parameters, pack_values, read_table, stack_tables
 from steerclear.shield.tables.lookup import LEVELS_S
 from steerclear.shield.tables.make import convergence, make_table
@@ -52,6 +53,17 @@ def meeting(distance_m):
     own, other = (full_thrust_state(get_platform("heron"), 2.0, heading) for heading in (0.0, 180.0))
     other[L.Y] = distance_m
     return own, other
+
+
+def test_a_pursuer_that_loses_all_its_way_at_full_rudder_goes_straight():
+    params = replace(get_platform("heron_v22"), name="stalls", turn_loss=1.0).pack()
+    pursuer, prey = (
+        full_thrust_state(get_platform("heron"), 0.0, 0.0),
+        full_thrust_state(get_platform("heron"), 2.0, 0.0),
+    )
+    for x_m in (0.0, 5.0):  # ahead, and to the side
+        prey[L.X], prey[L.Y] = x_m, 10.0
+        assert chase(params, pursuer, prey, False) == 0.0
 
 
 def test_a_head_on_from_outside_the_set_is_survived_and_from_inside_it_is_not():
