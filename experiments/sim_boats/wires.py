@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from steerclear.shield.bridge.feed_packets import socket_address
 from steerclear.shield.bridge.fleet_checks import MOOS
 from steerclear.shield.bridge.mavlink.framing import Framer
-from steerclear.shield.bridge.mavlink.transport import Address, Peer, make_wire, parse_address
+from steerclear.shield.bridge.mavlink.transport import Address, Peer, make_wire, parse_address, place_text
 from steerclear.shield.exceptions import ConfigError, LinkError
 
 from .boat import Boat
@@ -27,7 +27,7 @@ REDIAL_S, DIAL_S = 0.5, 0.2
 def near(address: str, allow_remote: bool) -> str:
     """Return HOST:PORT of a listener; `ConfigError` where it is malformed, or elsewhere without ``allow_remote``."""
     host, port = socket_address(address)
-    return f"{_near_host(host, address, allow_remote)}:{port}"
+    return place_text(_near_host(host, address, allow_remote), port)
 
 
 def _near_host(host: str, address: str, allow_remote: bool) -> str:

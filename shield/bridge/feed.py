@@ -27,9 +27,9 @@ from .feed_packets import (
     GameState,
     Packet,
     Seal,
-    family_of,
     is_sealed,
     parse_packet,
+    place_of,
     socket_address,
 )
 from .frame import FieldFrame
@@ -361,13 +361,16 @@ class Budget:
 
 def _hearing_socket(listen: str) -> socket.socket:
     host, port = socket_address(listen)
-    opened = socket.socket(family_of(host), socket.SOCK_DGRAM)
+    opened: socket.socket | None = None
     try:
+        family, place = place_of(host, port)
+        opened = socket.socket(family, socket.SOCK_DGRAM)
         opened.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER_BYTES)
         opened.settimeout(_WAKE_S)
-        opened.bind((host, port))
+        opened.bind(place)
     except OSError as error:
-        opened.close()
+        if opened is not None:
+            opened.close()
         raise BridgeError(
             f"cannot hear the feed at {listen} ({error.strerror or error}); end the program that uses the port, or "
             "give another address"

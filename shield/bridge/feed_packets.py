@@ -313,14 +313,13 @@ class FeedSender(Closing):
         self.sender = sender
         self.run = random.SystemRandom().randrange(1, 2**31)
         self._seal, self._clock, self._seq = None if key is None else Seal(key), SigningClock(), 0
-        self._to: list[tuple[str, int]] = []
+        self._to: list[tuple[socket.AddressFamily, Any]] = []
         for host, port in map(socket_address, to):
             try:
-                found = socket.getaddrinfo(host, None, family_of(host), socket.SOCK_DGRAM)
+                self._to.append(place_of(host, port))
             except OSError as error:
                 raise ConfigError(f"nobody knows the host {host!r} ({error.strerror}); give its address") from None
-            self._to.append((str(found[0][4][0]), port))
-        families = {family_of(host) for host, _ in self._to}
+        families = {family for family, _ in self._to}
         self._sockets = {family: socket.socket(family, socket.SOCK_DGRAM) for family in families}
         for opened in self._sockets.values():
             opened.setblocking(False)
@@ -343,11 +342,11 @@ class FeedSender(Closing):
         data = Packet(self.sender, self.run, self._seq, fixes, game, stamp=stamp).encode()
         data = data if self._seal is None else self._seal.close(data)
         self._seq += 1
-        for host, port in self._to:
+        for family, place in self._to:
             try:
-                self._sockets[family_of(host)].sendto(data, (host, port))
+                self._sockets[family].sendto(data, place)
             except OSError as error:  # nobody listens there now, or the network is away: the next packet tries again
-                LOG.debug("feed to %s:%d: %s", host, port, error)
+                LOG.debug("feed to %s: %s", place, error)
 
 
 class PositionPublisher:
@@ -391,6 +390,11 @@ def socket_address(text: str) -> tuple[str, int]:
     return place
 
 
-def family_of(host: str) -> socket.AddressFamily:
-    """IPv6 or IPv4; names, such as localhost, count as IPv4."""
-    return socket.AF_INET6 if ":" in host else socket.AF_INET
+def place_of(host: str, port: int) -> tuple[socket.AddressFamily, Any]:
+    """IPv6 or IPv4 (names, such as localhost, count as IPv4), and the place as sockets of that family take it.
+
+    Raises:
+        OSError: nobody knows the host.
+    """
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    return family, socket.getaddrinfo(host, port, family, socket.SOCK_DGRAM)[0][4]

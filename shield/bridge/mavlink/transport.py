@@ -21,9 +21,10 @@ DEFAULT_BAUD = 57_600
 _HOST = r"[A-Za-z0-9_-]{1,63}(\.[A-Za-z0-9_-]{1,63}){0,15}\.?|\[[0-9A-Fa-f:.]{2,45}(%[A-Za-z0-9]{1,16})?\]"
 _PLACE = re.compile(rf"(?P<host>{_HOST}):(?P<port>[0-9]{{1,5}})")
 _NUMERIC = re.compile(r"(^|\.)(0[xX][0-9A-Fa-f]*|[0-9]+)\.?$|[\[\]]")
-_DEVICE = re.compile(r"(?P<name>[^:]+)(:(?P<baud>[0-9]{1,7}))?")
+_DEVICE = re.compile(r"(?P<name>[^:]+|/dev/serial/by-.+?)(:(?P<baud>[0-9]{1,7}))?")  # names by path hold colons
 
-Peer = tuple[str, int]  # who sent: host and port; on wires with one end, always the same
+Peer = tuple[Any, ...]
+"""Who sent: host and port, of IPv6 also flow and scope, as sockets take it; on wires with one end, always the same."""
 
 _DATAGRAM, _CHUNK, _WAITING, _DIAL_S = 65_535, 8_192, 2_048, 5.0
 _REMEDIES = {
@@ -44,7 +45,8 @@ class Address:
     number: int  # port, or baud rate
 
     def __str__(self) -> str:
-        return f"{self.kind}:{place_text(self.host, self.number)}"
+        place = f"{self.host}:{self.number}" if self.kind == "serial" else place_text(self.host, self.number)
+        return f"{self.kind}:{place}"
 
 
 def parse_address(text: str) -> Address:
@@ -189,13 +191,13 @@ class Wire:
         return LinkError(f"cannot open link {self.address} ({error.strerror or error}); {remedy}")
 
     def _socket(self, kind: int) -> tuple[socket.socket, Peer]:
-        """A socket of the address's family, and host and port in numbers."""
+        """A socket of the address's family, and its place in numbers."""
         try:
             family, _, _, _, place = socket.getaddrinfo(self.address.host, self.address.number, type=kind)[0]
         except OSError as error:
             host = self.address.host
             raise LinkError(f"link {self.address}: there is no host {host!r} ({error.strerror}); correct it") from None
-        return socket.socket(family, kind), (str(place[0]), int(place[1]))
+        return socket.socket(family, kind), place
 
 
 class UdpWire(Wire):
@@ -226,7 +228,7 @@ class UdpWire(Wire):
             data, peer = self._end.recvfrom(_DATAGRAM)
         except (BlockingIOError, InterruptedError, ConnectionError):
             return None  # ConnectionError: the peer's machine says nobody listens there; it may yet
-        return data, (str(peer[0]), int(peer[1]))
+        return data, peer
 
     def send(self, data: bytes, peer: Peer | None) -> bool:
         """One datagram; see `Wire`."""

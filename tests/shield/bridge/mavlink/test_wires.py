@@ -7,7 +7,7 @@ import socket
 import time
 
 import pytest
-from steerclear.shield.bridge.mavlink.transport import Address, SerialWire, TcpWire, UdpWire, parse_address
+from steerclear.shield.bridge.mavlink.transport import Address, SerialWire, TcpWire, UdpWire, make_wire, parse_address
 from steerclear.shield.exceptions import LinkError
 
 
@@ -44,6 +44,9 @@ def dialled():
         yield both
 
 
+BY_PATH = "/dev/serial/by-path/pci-0000:00:14.0-usb-0:1:1.0-port0"
+
+
 @pytest.mark.parametrize(
     ("text", "address"),
     [
@@ -51,12 +54,47 @@ def dialled():
         ("tcp:boat.local:5760", Address("tcp", "boat.local", 5760)),
         ("udpout:[::1]:14550", Address("udpout", "::1", 14550)),
         ("serial:/dev/ttyUSB0:115200", Address("serial", "/dev/ttyUSB0", 115200)),
+        ("udpin:[fe80::1%eth0]:14550", Address("udpin", "fe80::1%eth0", 14550)),
         ("serial:/dev/ttyUSB0", Address("serial", "/dev/ttyUSB0", 57600)),
+        (f"serial:{BY_PATH}:115200", Address("serial", BY_PATH, 115200)),
+        (f"serial:{BY_PATH}", Address("serial", BY_PATH, 57600)),
     ],
 )
 def test_addresses_that_are(text, address):
     assert parse_address(text) == address
     assert parse_address(str(address)) == address, "what errors name can be given"
+
+
+SCOPED = ("fe80::1", 14550, 0, 7)
+
+
+@pytest.mark.parametrize("kind", ["udpin", "udpout", "tcp", "tcpin"])
+def test_an_address_of_one_network_alone_keeps_its_scope(kind, monkeypatch):
+    given, places = [], [(socket.AF_INET6, 0, 0, "", SCOPED)]
+
+    class Places(socket.socket):
+        """Keeps the places it is given."""
+
+        def bind(self, place):
+            given.append(place)
+
+        connect = bind
+
+        def sendto(self, data, place):
+            given.append(place)
+            return len(data)
+
+        def recvfrom(self, most):
+            return b"x", SCOPED
+
+    monkeypatch.setattr(socket, "getaddrinfo", lambda host, *_, **__: places if host == "fe80::1%eth0" else [])
+    monkeypatch.setattr(socket, "socket", Places)
+    with closing(make_wire(parse_address(f"{kind}:[fe80::1%eth0]:14550"))) as wire:
+        wire.open()
+        if kind == "udpin":
+            _, peer = wire.receive()
+            assert wire.send(b"y", peer)
+    assert given == [SCOPED] * (1 + (kind == "udpin"))
 
 
 @pytest.mark.parametrize(
