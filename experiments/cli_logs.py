@@ -230,7 +230,7 @@ def _show_boats(content: dict[str, Any], files: list[str], plays: bool) -> None:
 
 @command()
 def replay(
-    log: Annotated[Path, typer.Argument(help="Black-box log (.mcap) that deploy wrote.")],
+    log: Annotated[Path, typer.Argument(metavar="LOG.mcap", help="Black-box log that deploy wrote.")],
     judge_violations: Annotated[
         bool, o.flag("Also tell how close boats came, and judge which violations were avoidable.", "--judge")
     ] = False,

@@ -182,7 +182,16 @@ class OnceCommand(TyperCommand):
             if isinstance(option, TyperOption) and not option.multiple and given.count(option) > 1:
                 joined = ", values joined by commas" if "," in (option.metavar or "") else ""
                 ctx.fail(f"{option.opts[0]} is given twice; give it once{joined}")
-        return list(super().parse_args(ctx, args))
+        ctx.allow_extra_args = True  # to be refused in words of ours
+        extra = list(super().parse_args(ctx, args))
+        if extra:
+            ctx.fail(f"{extra[0]} is one too many; {self._takes()}")
+        return extra
+
+    def _takes(self) -> str:
+        """What is given besides options, as a remedy."""
+        names = [str(one.metavar or one.name) for one in self.params if one.param_type_name == "argument"]
+        return f"give {' and '.join(names)} alone, and the next one by itself" if names else "it takes options alone"
 
     def _check_values(self, ctx: Any, args: list[str]) -> None:
         """Refuse an option that another one follows, or nothing, in place of its value."""

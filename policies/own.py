@@ -5,6 +5,7 @@ Your own code runs in this process. Code of others is a submission.
 
 from __future__ import annotations
 
+import ast
 import importlib
 import importlib.util
 import sys
@@ -40,7 +41,7 @@ def file_of(where: str) -> Path | None:
 
 
 def check_own(where: str, name: str) -> None:
-    """Check that the file or module exists, without running it."""
+    """Check that the file or module exists and that the file is Python, without running it."""
     path = file_of(where)
     try:
         there = path.is_file() if path is not None else importlib.util.find_spec(where) is not None
@@ -50,6 +51,18 @@ def check_own(where: str, name: str) -> None:
         hint = near_files(where if where.endswith(".py") else f"{where}.py")
         file = path or f"{where}.py"
         raise PolicyError(f"there is no policy {where}:{name}: no file {file}; {hint}give FILE.py:NAME")
+    if path is not None:
+        _check_syntax(path)
+
+
+def _check_syntax(path: Path) -> None:
+    """Refuse a file that Python cannot read."""
+    try:
+        ast.parse(path.read_bytes(), path.name)
+    except SyntaxError as error:
+        raise PolicyError(f"{path}, line {error.lineno}: {error.msg}; correct the Python there") from None
+    except (OSError, ValueError, RecursionError, MemoryError) as error:
+        raise PolicyError(f"{path} cannot be read as Python ({describe_error(error)}); correct it") from None
 
 
 def load_own(where: str, name: str) -> TeamPolicy:

@@ -178,7 +178,7 @@ def _checked(entry: Field[Any], value: Any) -> float | None:
         raise ConfigError(f"{name} is too large; give a finite number") from None
     if not low <= number <= high or (above and number == low):
         unit = next((unit for end, unit in _UNITS.items() if name.endswith(f"_{end}")), "")
-        small = unit in ("m", "s", "m/s") and 2.0 * high <= number < math.inf
+        small = unit in ("m", "s") and 2.0 * high <= number < math.inf
         hint = f" (if that is m{unit}, give {number / 1000.0:g})" if small else ""
         first = f"more than {low:g} and at most" if above else f"{low:g} to"
         raise ConfigError(f"{name} is {value}{hint}; give {first} {high:g} {unit}".rstrip())

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 from steerclear.shield import Shield
-from steerclear.shield.bridge.blackbox.disk import explain
+from steerclear.shield.bridge.blackbox.disk import explain, make_folder
 from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.exceptions import BridgeError
@@ -133,7 +133,7 @@ def logging_aside(path: Path | None, shown: bool) -> Iterator[None]:
     handlers: list[logging.Handler] = [logging.StreamHandler()] if shown else []
     if path is not None:
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
+            make_folder(path.parent)
             handlers.append(logging.FileHandler(path, encoding="utf-8"))
         except OSError as error:
             raise BridgeError(f"cannot begin the log {path}: {explain(error)}") from None

@@ -28,7 +28,7 @@ def check_fleet(fleet: FleetFile) -> None:
     Raises:
         FleetFileError: two things of the file contradict each other; one line that names both.
     """
-    checks = (_agents, _platforms, _room, _links, _contacts, _listeners, _limits)
+    checks = (_agents, _platforms, _current, _room, _links, _contacts, _listeners, _limits)
     for fault in chain.from_iterable(check(fleet) for check in checks):
         raise FleetFileError(fault)
 
@@ -124,6 +124,18 @@ def _platforms(fleet: FleetFile) -> Iterator[str]:
     for name in {boat.platform for boat in fleet.boats} | set(fleet.platforms):
         platform_of(fleet, name)
     yield from ()
+
+
+def _current(fleet: FleetFile) -> Iterator[str]:
+    """Each boat that is steered makes way against the current that the shield is told of."""
+    current_mps = fleet.shield_config.current_mps
+    for boat in filter(lambda boat: boat.is_steered, fleet.boats):
+        platform = fleet.platform_of[boat.name]
+        if current_mps >= platform.max_speed_mps:
+            yield (
+                f"shield.current_mps is {current_mps:g} m/s and boat {boat.name!r} ({platform.name}) makes "
+                f"{platform.max_speed_mps:g} m/s at most: it cannot hold its place; give a smaller one, or stay ashore"
+            )
 
 
 def _room(fleet: FleetFile) -> Iterator[str]:

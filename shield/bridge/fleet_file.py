@@ -191,6 +191,8 @@ def parse_fleet(text: str, where: str = "FLEET.yaml", folder: Path | None = None
         raise FleetFileError(f"{where} is not YAML of a fleet file: {error}") from None
     if not isinstance(content, dict):
         raise FleetFileError(f"{where} holds no settings; give version, field, geofence, team and boats")
+    if "max_speed_mps" in content:
+        raise FleetFileError(f"{where} is a platform file, of one boat; give a FLEET.yaml whose boats name it")
     version = content.get("version")
     if isinstance(version, int) and version > VERSION:
         raise FleetFileError(f"{where}: version {version} is newer than this steerclear reads ({VERSION}); update it")

@@ -34,20 +34,21 @@ def read_obstacles(fleet: FleetFile) -> tuple[Obstacle, ...]:
     """
     found, edges = [], 0
     for number, obstacle in enumerate(fleet.obstacles):
+        which = f"obstacles[{number}]" + (f" ({obstacle.name})" if obstacle.name else "")
         given = [form for form in FORMS if getattr(obstacle, form) is not None]
         if len(given) != 1:
             has = " and ".join(given) or "no form"
-            raise FleetFileError(f"obstacles.{number} has {has}; give one of {', '.join(FORMS)}")
+            raise FleetFileError(f"{which} has {has}; give one of {', '.join(FORMS)}")
         parts = [obstacle]
         if obstacle.geojson is not None:
-            lines = _geojson_lines(obstacle.geojson, f"obstacles.{number}.geojson")
+            lines = _geojson_lines(obstacle.geojson, f"{which}.geojson")
             parts = [obstacle.model_copy(update={"geojson": None, "polygon_deg": line}) for line in lines]
         for corners in (corners_m(part, fleet.frame) for part in parts):
             edges += len(corners)
             far_m = max((fleet.geofence.outside_m(*corner) for corner in corners), default=0.0)
             if not far_m <= FARTHEST_M:
                 raise FleetFileError(
-                    f"obstacles.{number}: a corner lies {far_m / 1e3:.0f} km from the geofence; give polygon_deg as "
+                    f"{which}: a corner lies {far_m / 1e3:.0f} km from the geofence; give polygon_deg as "
                     "[latitude, longitude], GeoJSON as [longitude, latitude], polygon_m in m"
                 )
         found += parts
@@ -70,7 +71,8 @@ def _geojson_lines(path: Path, key: str) -> list[Line]:
             raise FleetFileError(f"{key}: {path} is larger than {MOST_BYTES >> 20} MiB; cut it to the water you use")
         content = json.loads(path.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError, RecursionError) as error:
-        raise FleetFileError(f"{key}: cannot read {path} ({error}); give a GeoJSON file") from None
+        why = getattr(error, "strerror", None) or error
+        raise FleetFileError(f"{key}: cannot read {path} ({why}); give the path of a GeoJSON file") from None
     try:
         lines = [_closed(line) for line in _lines(content)]
     except (TypeError, ValueError, KeyError, AttributeError, RecursionError) as error:

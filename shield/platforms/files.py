@@ -93,6 +93,9 @@ def parse_platform(text: str) -> PlatformFile:
         raise PlatformError(str(error)) from None
     if not isinstance(given, Mapping):
         raise PlatformError("it holds no settings; make one with: steerclear platform new NAME")
+    if "boats" in given:
+        boats = "of a fleet, with its boats; give a boat's own platform file, or check the fleet with"
+        raise PlatformError(f"it is a FLEET.yaml {boats}: steerclear preflight")
     return platform_file_of(dict(given))
 
 

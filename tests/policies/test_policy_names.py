@@ -142,16 +142,26 @@ def test_what_is_in_a_file_plays(name, action):
         ("gone:act", "there is no policy gone:act"),
         ("mypol:swim", "mypol has no 'swim'; define there a function act"),
         ("mypol:NUMBER", "is a int; give a function act"),
+        ("torn.py", "torn.py, line 2: .*correct the Python there"),
         ("mypol:Broken", "cannot be built: RuntimeError: no luck"),
     ],
 )
 def test_what_is_no_policy_is_refused_in_words(name, words):
+    Path("torn.py").write_text("X = 1\nclass Torn(:\n")
+
     def both():
         policies.check(name)
         policies.make(name)
 
     with pytest.raises(PolicyError, match=words):
         both()
+
+
+@pytest.mark.parametrize("content", [b"class Torn(:", b"\0", b"x = '\xff'", b"(" * 5000], ids=range(4))
+def test_a_file_that_is_no_python_is_refused_without_running_it(content):
+    Path("torn.py").write_bytes(content)
+    with pytest.raises(PolicyError, match=r"torn\.py.*correct"):
+        policies.check("torn.py:act")
 
 
 @pytest.mark.parametrize("name", ["medium", "sb3:model", "weights:net", "team/solution.py", "team.zip", "a b:c"])

@@ -47,6 +47,18 @@ _MEANINGS = {
 }
 
 
+def make_folder(folder: Path) -> None:
+    """Make a folder for logs, unless it is there.
+
+    Raises:
+        OSError: it cannot be made, see `explain`; `NotADirectoryError`: there is a file of that name.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(folder)) from None
+
+
 def explain(error: OSError) -> str:
     """What an error of the file system means, and the remedy, in one line."""
     unknown = (f"writing failed ({error.strerror or error})", _ELSEWHERE)
@@ -68,7 +80,7 @@ class Disk:
         self.size = 0
         self._pending = bytearray()
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
+            make_folder(path.parent)
             self._file: int | None = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
         except OSError as error:
             raise BridgeError(f"cannot begin the log {path}: {explain(error)}") from error
@@ -313,7 +325,7 @@ def check_disk(folder: Path, *, boats: int, minutes: float = 120.0, name: str = 
     """
     needed_mib = boats * minutes * 60.0 * BYTES_PER_BOAT_S / 2**20
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folder(folder)
         with tempfile.TemporaryFile(dir=folder) as file:  # the time that the disk takes to keep a second's worth of log
             started = time.monotonic()
             file.write(os.urandom(_CHUNK))

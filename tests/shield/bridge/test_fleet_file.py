@@ -65,6 +65,12 @@ WRONG = [
     ("team: blue", "team: blue\nrate_hz: .inf", "rate_hz"),
     ("team: blue", "team: blue\nshield: {dellay_s: 1}", "did you mean 'delay_s'"),
     ("team: blue", "team: blue\nshield: {dt_s: 0.5}", "leave shield.dt_s out"),
+    (
+        "team: blue",
+        "team: blue\nshield: {current_mps: 2.0}",
+        "and boat 'blue_1' (heron) makes 2 m/s",
+    ),
+    ("version: 1", "max_speed_mps: 3.0\nversion: 1", "is a platform file, of one boat; give a FLEET.yaml"),
     ("team: blue", "team: blue\nshield: {barriers: ferry}", "shield.barriers: what they are given is not in"),
     ("team: blue", "team: blue\nshield: {coordination: per_boat}", "leave shield.coordination out"),
     ("team: blue", "team: blue\nshield: {max_track_age_s: 1.0}", "leave shield.max_track_age_s out"),

@@ -72,7 +72,11 @@ BAD = {
     "another water": ([{"polygon_deg": [[lon, lat] for lat, lon in places(CORNERS)]}], "km from the geofence; give"),
     "too many edges": ([{"polygon_m": [[k, 90.0 + k % 2] for k in range(401)]}], "401 edges, more than 400"),
     "an unknown key": ([{"polygon": CORNERS}], "did you mean"),
-    "no file": ([{"geojson": "there.is.none"}], "cannot read .*there.is.none"),
+    "no file": (
+        [{"geojson": "none"}],
+        r"obstacles\[0\]\.geojson: cannot read none \(No such file [^(]*\); give",
+    ),
+    "a named one": ([{"name": "pier", "geojson": "none"}], r"obstacles\[0\] \(pier\)\.geojson: cannot read none"),
 }
 
 

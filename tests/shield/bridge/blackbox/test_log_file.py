@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from logged_runs import START_S, UNIX_NS, Encounter, header_of, reading_of, write_log
 from mcap.reader import make_reader
-from steerclear.shield.bridge.blackbox import LogReader, McapWriter, check_disk, disk
+from steerclear.shield.bridge.blackbox import Disk, LogReader, McapWriter, check_disk, disk
 from steerclear.shield.bridge.messages import Tick
 from steerclear.shield.exceptions import BridgeError, LogError
 
@@ -234,4 +234,6 @@ def test_a_file_where_the_folder_should_be(tmp_path, name):
     (tmp_path / "logs").write_text("")
     result = check_disk(tmp_path / name, boats=1)
     assert not result.passed
-    assert "set log_dir" in result.text or "give a name" in result.text
+    assert "the folder is a file; set log_dir to a folder" in result.text
+    with pytest.raises(BridgeError, match="the folder is a file; set log_dir to a folder"):
+        Disk(tmp_path / name / "run.mcap")
