@@ -50,7 +50,7 @@ def workplace(tmp_path, monkeypatch, game_record):
     Path("fleet.yaml").write_text(demo.read_text(encoding="utf-8"))
     Path("alone.yaml").write_text(ALONE)
     Path("boat.yaml").write_text("name: tub\nmax_speed_mps: 2.0\n")
-    Path("ashore.yaml").write_text(demo.read_text(encoding="utf-8").replace("log_dir: logs", "log_dir: text.txt"))
+    Path("ashore.yaml").write_text(demo.read_text(encoding="utf-8").replace("log_dir: ./logs", "log_dir: text.txt"))
     Path("torn.py").write_text("class Torn(:\n")
     return tmp_path
 
