@@ -17,7 +17,7 @@ from steerclear.shield.renamed import current_settings
 
 from . import plots
 from .bench import bench_tables
-from .deploy.keys import DEPLOY, REFEREE, REPLAY
+from .deploy.keys import FIGURES
 from .encounters.attack import KEYS as ATTACK
 from .encounters.figures import KEYS as ENCOUNTERS
 from .markdown import MADE, line, table
@@ -313,9 +313,7 @@ def _keys() -> dict[str, dict[str, str]]:
         columns={re.sub(r"_\d+\.\d+m$", "_*", metric.column): metric.meaning for metric in counted},
         encounters=ENCOUNTERS,
         attack=ATTACK,
-        deploy=DEPLOY,
-        referee=REFEREE,
-        replay=REPLAY,
+        figures={figure.key: figure.meaning for figure in FIGURES},
     ).split("\n## ")[1:]:
         commands, *lines = section.strip().splitlines()
         entries = dict(line.split(": ", 1) for line in lines if line)

@@ -108,7 +108,7 @@ class Difference(NamedTuple):
 
 @dataclass
 class Proof:
-    """Result of a replay: counts and the first of each, see `keys.REPLAY`; ``covered``: decisions for an own boat."""
+    """Result of a replay: counts and the first of each, see `docs.KEYS`; ``covered``: decisions for an own boat."""
 
     ticks: int = 0
     decisions: int = 0

@@ -28,7 +28,7 @@ MOST_ROWS = 12  # most rows of a table; the rest is only counted
 
 @dataclass
 class Replay:
-    """Result of a replay, see `keys.REPLAY`."""
+    """Result of a replay, see `docs.KEYS`."""
 
     header: LogHeader
     proof: Proof
@@ -133,7 +133,7 @@ def judge(replay: Replay) -> None:
 
 
 def as_content(replay: Replay) -> dict[str, Any]:
-    """The report as JSON-ready content, see `keys.REPLAY`."""
+    """The report as JSON-ready content, see `docs.KEYS`."""
     proof = replay.proof
     shown = ("began", "seconds", "complete", "made_by", "proved", "damage", "origin")
     chain = ("chained", "keyed", "codes_checked", "broken", "breaks")
