@@ -19,7 +19,7 @@ from steerclear.policies.registry import SB3_PREFIX
 from steerclear.shield.bridge.blackbox import McapWriter, check_disk, header_of_fleet, log_path
 from steerclear.shield.bridge.clock import Clock, MonotonicClock
 from steerclear.shield.bridge.control_loop import ControlLoop, Timing
-from steerclear.shield.bridge.drill import Drill, Missed, drill_checks
+from steerclear.shield.bridge.drill import Drill, drill_checks
 from steerclear.shield.bridge.feed_packets import FeedSender, PositionPublisher
 from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.link_checks import check_fence, link_checks
@@ -260,13 +260,12 @@ def _drill(boats: Boats) -> None:
     """Drive one boat after the other a short way, and run the drill's checks."""
     run = boats.run
     drill = Drill(run.fleet, tuple(boats.session.links))
-    missed = Missed(drill)
 
     def begins(loop: ControlLoop) -> None:
-        missed.model_error = loop.model_error
+        drill.model_error = loop.model_error
 
-    boats.sail(drill, drill.seconds + 2.0 * run.fleet.dt_s, (drill, missed), begins=begins)
-    run.outcome.checks += run_checks(drill_checks(drill, missed, run.fleet), run.surface.shown)
+    boats.sail(drill, drill.seconds + 2.0 * run.fleet.dt_s, (drill,), begins=begins)
+    run.outcome.checks += run_checks(drill_checks(drill, run.fleet), run.surface.shown)
     run.outcome.refused = not_passed(run.outcome.checks, run.orders.accept)
 
 

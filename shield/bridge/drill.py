@@ -7,9 +7,8 @@ back hold what was really sent and what the boats did.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,7 @@ from .fleet_file import FleetFile
 from .messages import Answer, BoatReading, Snapshot, Tick
 from .model_error import AHEAD_S as PREDICTED_S
 from .model_error import ENOUGH_S, SHARE, TOLD_BY, ModelErrorMonitor
-from .preflight_checks import Check, CheckResult, found
+from .preflight_checks import Check, Found, checks_by_kind, found
 
 AHEAD_S = 8.0
 TURN_S = 7.0
@@ -63,6 +62,8 @@ class DrillSample:
     # whether something else than the drill's own command was decided: the shield gave way, a declared response was
     # due, or nothing could be decided
     changed: bool = False
+    # how far the boat is from where it was predicted, m, for each of `PREDICTED_S`; NaN where there is no telling
+    missed_m: tuple[float, ...] = (math.nan,) * len(PREDICTED_S)
 
 
 class Drill:
@@ -71,11 +72,13 @@ class Drill:
     Attributes:
         seconds: how long it takes.
         samples: by boat's name, of its own turn only.
+        model_error: the loop's monitor; set before the loop runs. None: nothing is known of predictions.
     """
 
     def __init__(self, fleet: FleetFile, boats: Sequence[str]) -> None:
         self.samples: dict[str, list[DrillSample]] = {name: [] for name in boats}
         self.seconds = EACH_S * len(self.samples)
+        self.model_error: ModelErrorMonitor | None = None
         self._fleet = fleet
         self._boats = tuple(self.samples)
         self._began_s = math.nan
@@ -103,9 +106,10 @@ class Drill:
         reading, sent = tick.readings.get(boat), tick.sent.get(boat)
         if reading is not None:
             command = (math.nan, math.nan) if sent is None else (sent.heading_rad, sent.speed_mps)
-            self.samples[boat].append(
-                DrillSample(tick.began_s, reading, *command, self._is_changed(boat, tick, command))
-            )
+            sample = DrillSample(tick.began_s, reading, *command, self._is_changed(boat, tick, command))
+            if self.model_error is not None:
+                sample = replace(sample, missed_m=self.model_error.latest_m(boat))
+            self.samples[boat].append(sample)
 
     def turn_of(self, time_s: float) -> tuple[str, float]:
         """Whose turn it is and for how long already, s; no name before and after."""
@@ -177,68 +181,50 @@ class Drill:
         return float(np.min([x - xmin, xmax - x, y - ymin, ymax - y]))
 
 
-class Missed:
-    """A `TickSink` that keeps, of the boat whose turn it is, how far it is from where it was predicted, m.
+@dataclass(frozen=True)
+class Driven:
+    """What the checks of a drill look at: a boat's own turn of it, its platform, and what the file says."""
 
-    Attributes:
-        model_error: the loop's monitor; set before the loop runs.
-        errors_m: by boat's name, rows of the errors of `PREDICTED_S`; NaN where there is no telling.
-    """
-
-    def __init__(self, drill: Drill) -> None:
-        self.model_error: ModelErrorMonitor | None = None
-        self.errors_m: dict[str, list[tuple[float, ...]]] = {name: [] for name in drill.samples}
-        self._drill = drill
-
-    def take(self, tick: Tick) -> None:
-        """See `TickSink`."""
-        boat, _ = self._drill.turn_of(tick.began_s)
-        if boat and self.model_error is not None:
-            self.errors_m[boat].append(self.model_error.latest_m(boat))
-
-    def close(self) -> None:
-        """Nothing is held."""
+    samples: Sequence[DrillSample]
+    platform: Platform
+    dt_s: float  # step of the loop, s
+    outside_m: float  # ``limits.model.outside_m``: beyond it a boat is slowed
 
 
-def drill_checks(drill: Drill, missed: Missed, fleet: FleetFile) -> list[Check]:
-    """Checks of a drill that has been driven, with its samples and what the boats' models missed meanwhile."""
-    checks, dt_s, most_m = [], fleet.dt_s, fleet.limits.model.outside_m
-    for boat, samples in drill.samples.items():
-        platform, errors_m = fleet.platform_of[boat], missed.errors_m[boat]
-        checks.append(Check(f"course:{boat}", partial(check_course, boat, samples)))
-        checks.append(Check(f"response:{boat}", partial(check_response, boat, samples, platform, dt_s)))
-        checks.append(Check(f"model:{boat}", partial(check_model, boat, errors_m, platform, most_m, dt_s)))
-    return checks
+def drill_checks(drill: Drill, fleet: FleetFile) -> list[Check]:
+    """Checks of a drill that has been driven."""
+    limit_m = fleet.limits.model.outside_m
+    return checks_by_kind(
+        KINDS, drill.samples, lambda boat: Driven(drill.samples[boat], fleet.platform_of[boat], fleet.dt_s, limit_m)
+    )
 
 
-def check_model(
-    boat: str, errors_m: list[tuple[float, ...]], platform: Platform, most_m: float, dt_s: float
-) -> CheckResult:
+def check_model(driven: Driven) -> Found:
     """The boat was where its model foresaw it, near enough that it would not be slowed for it (``limits.model``)."""
-    errors = np.array(errors_m, dtype=float).reshape(-1, len(PREDICTED_S))
+    errors = np.array([sample.missed_m for sample in driven.samples]).reshape(-1, len(PREDICTED_S))
     errors = errors[np.isfinite(errors).all(axis=1)]
-    judged_s = len(errors) * dt_s
+    judged_s = len(errors) * driven.dt_s
     if judged_s < ENOUGH_S:
         text = (
             f"its place was known and predicted for {judged_s:.1f} s of its drill, {ENOUGH_S:g} s are needed; "
             "see its rates and links, then run again"
         )
-        return CheckResult(f"model:{boat}", False, text, {"judged_s": judged_s})
+        return False, text, {"judged_s": judged_s}
     missed_m = np.quantile(errors, SHARE, axis=0)
     fine = f"its model misses {'/'.join(f'{missed:.1f}' for missed in missed_m)} m 1/2/3 s ahead (95 of 100)"
     fault = (
-        f"{fine}, and beyond {most_m:g} m it would be slowed and handed over (limits.model); drive "
-        f"steerclear sea-trial, and put what steerclear fit makes of its log in place of {platform.name}"
+        f"{fine}, and beyond {driven.outside_m:g} m it would be slowed and handed over (limits.model); drive "
+        f"steerclear sea-trial, and put what steerclear fit makes of its log in place of {driven.platform.name}"
     )
     figures = {f"missed_{ahead:g}s_m": float(missed) for ahead, missed in zip(PREDICTED_S, missed_m, strict=True)}
-    return CheckResult(f"model:{boat}", *found(fine, figures, (missed_m[TOLD_BY] > most_m, fault)))
+    return found(fine, figures, (missed_m[TOLD_BY] > driven.outside_m, fault))
 
 
-def check_course(boat: str, samples: Sequence[DrillSample]) -> CheckResult:
+def check_course(driven: Driven) -> Found:
     """On straight runs the boat goes where it points."""
     straight = (
         s.reading
-        for s in samples
+        for s in driven.samples
         if s.reading.speed_mps > COURSE_MPS and abs(s.reading.turn_rate_rads) < math.radians(STEADY_DPS)
     )
     off = [value for reading in straight if math.isfinite(value := reading.heading_rad - reading.course_rad)]
@@ -246,12 +232,12 @@ def check_course(boat: str, samples: Sequence[DrillSample]) -> CheckResult:
         text = (
             f"it ran straight at more than {COURSE_MPS:g} m/s for too short; see its response, give it room, run again"
         )
-        return CheckResult(f"course:{boat}", False, text, {"samples": float(len(off))})
+        return False, text, {"samples": float(len(off))}
     mean = math.degrees(math.atan2(np.mean(np.sin(off)), np.mean(np.cos(off))))
     fault = f"it points {mean:+.0f} deg off its course; calibrate its compass, or wait for less current"
     figures = {"heading_less_course_deg": mean, "samples": float(len(off))}
     fine = f"points {mean:+.1f} deg off its course"
-    return CheckResult(f"course:{boat}", *found(fine, figures, (not abs(mean) <= COURSE_DEG, fault)))
+    return found(fine, figures, (not abs(mean) <= COURSE_DEG, fault))
 
 
 @dataclass(frozen=True)
@@ -268,14 +254,14 @@ class _Fit:
         return self.heading_deg / HEADING_DEG + self.speed_mps / SPEED_MPS
 
 
-def check_response(boat: str, samples: Sequence[DrillSample], platform: Platform, dt_s: float) -> CheckResult:
+def check_response(driven: Driven) -> Found:
     """The boat did what its platform file foretells of the commands sent."""
-    name = f"response:{boat}"
-    commanded = [s for s in samples if math.isfinite(s.heading_rad) and math.isfinite(s.speed_mps)]
+    platform, dt_s = driven.platform, driven.dt_s
+    commanded = [s for s in driven.samples if math.isfinite(s.heading_rad) and math.isfinite(s.speed_mps)]
     measured = np.array([_measured(s) for s in commanded])
     if len(commanded) < 5.0 / dt_s or not np.isfinite(measured).all():
         text = "commands or telemetry were missing during the drill; see the other checks, then run again"
-        return CheckResult(name, False, text)
+        return False, text, {}
     changed = float(np.mean([s.changed for s in commanded]))
     stretches = _stretches(commanded, dt_s)
     if changed > MOST_CHANGED or not stretches:
@@ -283,7 +269,7 @@ def check_response(boat: str, samples: Sequence[DrillSample], platform: Platform
             f"the drill was disturbed: {100.0 * changed:.0f} % of its commands were changed by the shield or a "
             "declared response, too little is left to judge; clear the water, then run again"
         )
-        return CheckResult(name, False, text, {"changed_share": changed})
+        return False, text, {"changed_share": changed}
     fits = [_fit(commanded, measured, platform, dt_s, steps) for steps in range(LONGEST_DELAY_STEPS + 1)]
     fit, delay_s = min(fits, key=lambda f: f.cost), _delay_s([f.heading_deg**2 for f in fits], dt_s)
     figures = {
@@ -305,7 +291,15 @@ def check_response(boat: str, samples: Sequence[DrillSample], platform: Platform
     )
     if not passed and changed:
         text += f"{disturbed}: repeat it on clear water before you believe it"
-    return CheckResult(name, passed, text, figures)
+    return passed, text, figures
+
+
+KINDS: Mapping[str, Callable[[Driven], Found]] = {
+    "course": check_course,
+    "response": check_response,
+    "model": check_model,
+}
+"""The checks, by name."""
 
 
 def counted_words(delay_s: float, dt_s: float) -> str:

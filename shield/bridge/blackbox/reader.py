@@ -61,14 +61,13 @@ class LogReader(Closing):
 
     Attributes:
         header: what the shield was built with.
-        files: those read: the one.
         complete: whether the log was closed; known once `entries` is used up.
         damage: what could not be read, in words; likewise.
         chain: what the log's chain says; likewise.
     """
 
     def __init__(self, path: Path, key: bytes | None = None) -> None:
-        self.path, self.files, self.complete = path, [path], False
+        self.path, self.complete = path, False
         self.damage: list[str] = []
         self.chain = ChainCheck(key)
         try:

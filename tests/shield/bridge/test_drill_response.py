@@ -15,7 +15,7 @@ from steerclear.shield.bridge.drill import (
     EACH_S,
     Drill,
     DrillSample,
-    Missed,
+    Driven,
     check_course,
     check_model,
     check_response,
@@ -25,7 +25,7 @@ from steerclear.shield.bridge.drill import (
 from steerclear.shield.bridge.fleet_file import parse_fleet
 from steerclear.shield.bridge.messages import BoatReading, Sent, Snapshot, Tick
 from steerclear.shield.bridge.model_error import ModelErrorMonitor
-from steerclear.shield.bridge.preflight_checks import run_checks
+from steerclear.shield.bridge.preflight_checks import CheckResult, run_checks
 from steerclear.shield.platforms import fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.proving import reference_models
@@ -77,8 +77,7 @@ class Water:
 def driven(boats=("blue_1",), bend=None, **water):
     """A drill that has been driven, and the water it was driven on; ``bend(s into it, values)`` stands for a shield."""
     drill, water = Drill(FLEET, boats), Water(**water)
-    monitor, water.missed = ModelErrorMonitor(FLEET, boats), Missed(drill)
-    water.missed.model_error = monitor
+    monitor = drill.model_error = ModelErrorMonitor(FLEET, boats)
     for k in range(round(drill.seconds / DT_S) + 5):
         now = 50.0 + DT_S * k
         readings = {name: water.reading(i, now) for i, name in enumerate(FLEET.names[:2])}
@@ -92,7 +91,6 @@ def driven(boats=("blue_1",), bend=None, **water):
         monitor.sent(sent)
         tick = Tick(k, now, now, now, readings, (), None, None, None, None, False, sent, 0.0)
         drill.take(tick)
-        water.missed.take(tick)
         water.step(values)
     return drill, water
 
@@ -108,7 +106,7 @@ def samples():
 
 
 def test_boats_that_are_what_the_file_says_pass(good):
-    results = run_checks(drill_checks(good[0], good[1].missed, FLEET))
+    results = run_checks(drill_checks(good[0], FLEET))
     kinds = ("course", "response", "model")
     assert [r.name for r in results] == [f"{kind}:{boat}" for boat in ("blue_1", "blue_2") for kind in kinds]
     assert all(r.passed for r in results), [r.text for r in results]
@@ -149,8 +147,13 @@ def test_boats_at_the_games_start_line_can_be_drilled_there(platform, preset):
     world.run(0.1).run(3 * EACH_S, each=lambda world: drill.take(world.last))
     for boat, driven_by in drill.samples.items():
         assert sum(sample.changed for sample in driven_by) / len(driven_by) <= 0.05
-        assert check_response(boat, driven_by, fleet.platform_of[boat], fleet.dt_s).passed
+        assert judged(check_response, driven_by, fleet.platform_of[boat], fleet.dt_s).passed
     assert world.closest_m > 2.5
+
+
+def judged(check, samples, platform=HERON, dt_s=DT_S):
+    """What a check says of a boat's own turn."""
+    return CheckResult(check.__name__, *check(Driven(samples, platform, dt_s, FLEET.limits.model.outside_m)))
 
 
 def given_way(begin_s, end_s, turn_deg=160.0):
@@ -165,7 +168,7 @@ def given_way(begin_s, end_s, turn_deg=160.0):
 
 
 def response_of(**water):
-    return check_response("blue_1", driven(**water)[0].samples["blue_1"], HERON, DT_S)
+    return judged(check_response, driven(**water)[0].samples["blue_1"])
 
 
 @pytest.mark.parametrize("steps", [0, 2, 4])
@@ -206,7 +209,7 @@ def test_a_boat_that_gave_way_to_another_is_not_taken_to_steer_the_wrong_way_rou
 
 
 def test_a_compass_that_is_off_is_found():
-    result = check_course("blue_1", driven(compass_deg=25.0)[0].samples["blue_1"])
+    result = judged(check_course, driven(compass_deg=25.0)[0].samples["blue_1"])
     assert not result.passed
     assert "+25 deg off its course; calibrate its compass" in result.text
 
@@ -214,45 +217,46 @@ def test_a_compass_that_is_off_is_found():
 def test_a_boat_that_does_not_move_passes_nothing():
     with reference_models():
         aground = replace(HERON, name="aground", max_speed_mps=0.01)
-    drill, water = driven(platform=aground)
-    for check in drill_checks(drill, water.missed, FLEET):
+    drill, _ = driven(platform=aground)
+    for check in drill_checks(drill, FLEET):
         assert not check.run().passed
 
 
-def model_of(boat, missed):
-    return check_model(boat, missed.errors_m[boat], HERON, FLEET.limits.model.outside_m, DT_S)
+def model_of(boat, drill):
+    return judged(check_model, drill.samples[boat])
 
 
 def test_a_boat_far_from_where_it_is_foreseen_is_to_be_fitted_first_by_what_is_missed_in_its_own_turn(good):
     """As the loop would slow it. In the other's turn it lies still, which must not thin its errors out."""
-    _, alone = driven(("blue_1",), reverse=True)
-    _, both = driven(("blue_1", "blue_2"), reverse=True)
-    results = [model_of("blue_1", water.missed) for water in (alone, both)]
-    for result in (*results, model_of("blue_2", both.missed)):
+    alone, _ = driven(("blue_1",), reverse=True)
+    both, _ = driven(("blue_1", "blue_2"), reverse=True)
+    results = [model_of("blue_1", drill) for drill in (alone, both)]
+    for result in (*results, model_of("blue_2", both)):
         assert not result.passed
         assert "steerclear sea-trial" in result.text
         assert "steerclear fit" in result.text
     figures = [result.figures["missed_2s_m"] for result in results]
     assert figures[0] > 1.5
     assert figures[1] == pytest.approx(figures[0], rel=0.05)
-    assert model_of("blue_1", good[1].missed).figures["missed_2s_m"] < 0.05
+    assert model_of("blue_1", good[0]).figures["missed_2s_m"] < 0.05
 
 
 @pytest.mark.parametrize("seen", [0, 30])
-def test_a_boat_that_was_hardly_seen_is_not_passed(seen):
-    result = check_model("blue_1", [(0.0, 0.0, 0.0)] * seen + [(0.0, math.nan, math.nan)] * 200, HERON, 1.5, DT_S)
+def test_a_boat_that_was_hardly_seen_is_not_passed(seen, samples):
+    missed_m = [(0.0, 0.0, 0.0)] * seen + [(0.0, math.nan, math.nan)] * 200
+    result = judged(check_model, [replace(samples[0], missed_m=row) for row in missed_m])
     assert not result.passed
     assert f"for {seen * DT_S:.1f} s of its drill, 5 s are needed" in result.text
 
 
 def test_going_astern_is_found(samples):
     astern = [replace(s, reading=replace(s.reading, speed_mps=-s.reading.speed_mps)) for s in samples]
-    assert "goes astern" in check_response("blue_1", astern, HERON, DT_S).text
+    assert "goes astern" in judged(check_response, astern).text
 
 
 def test_missing_and_impossible_samples_do_not_pass(samples):
     unknown = [DrillSample(0.1 * i, BoatReading("blue_1", 0.0), 1.0, 1.0) for i in range(200)]
     for missing in ([], unknown):
-        assert not check_response("blue_1", missing, HERON, DT_S).passed
-        assert not check_course("blue_1", missing).passed
-    assert not check_response("blue_1", [replace(s, heading_rad=math.nan) for s in samples], HERON, DT_S).passed
+        assert not judged(check_response, missing).passed
+        assert not judged(check_course, missing).passed
+    assert not judged(check_response, [replace(s, heading_rad=math.nan) for s in samples]).passed
