@@ -71,8 +71,8 @@ def game_metrics_of(radii_m: Collection[float] = RADII_M) -> list[Metric]:
     Args:
         radii_m: at which separation violations were counted.
     """
-    mates = "entries of two own boats into that radius, per pair"
-    opponents = "entries of an own boat and an opponent into that radius, per pair"
+    mates = "entries of two own boats into that distance, per pair"
+    opponents = "entries of an own boat and an opponent into that distance, per pair"
     driven = "of both, those of an own boat that the game controlled (tagged, out of bounds), which obeys no policy"
     changed = "% of the shield's decisions that differ from the nominal command; the column of a game: a fraction"
     stuck = "pairs of own boats that want to move and stood still for over 10 s"
@@ -124,7 +124,7 @@ REASONS = {
     "qp_relaxed": "the program's answer where not all could be kept, better than any backup",
     "backup": "no small change was safe: the boat carries out the turn and straight run that it kept ready",
     "escape": "another name of backup",
-    "best_effort": "no manoeuvre keeps the radius: the one that keeps most of it",
+    "best_effort": "no manoeuvre keeps the separation: the one that keeps most of it",
     "held": "the policy asked for nothing usable (no number, or absurdly large): the boat is told to stop on course",
     "right_of_way": "two teammates kept each other from turning: one gives way, one stands on",
     "limited": "the nominal speed is beyond what the boat does: cut to that, and so it is safe",

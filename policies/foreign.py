@@ -222,6 +222,10 @@ class ForeignCode(ABC):
         """Return a fault inside the code although the boat has an answer; None if there is none."""
         return None
 
+    def told(self, text: str) -> str:
+        """Return a text about a failure with places as its user knows them; the default leaves it as it is."""
+        return text
+
     def around(self) -> contextlib.AbstractContextManager[Any]:
         """Return a context for running foreign code, such as its working directory."""
         return contextlib.nullcontext()
@@ -325,7 +329,9 @@ class GuardedTeam(ForeignTeam):
         except PolicyError:
             raise
         except (Exception, SystemExit) as error:
-            raise PolicyError(f"policy {self.name!r} cannot begin a game: {describe_error(error)}") from error
+            raise PolicyError(
+                f"policy {self.name!r} cannot begin a game: {self.code.told(describe_error(error))}"
+            ) from error
 
     def _answers(
         self, observations: Mapping[str, np.ndarray], infos: Mapping[str, Any]
@@ -339,7 +345,7 @@ class GuardedTeam(ForeignTeam):
         try:
             action = answer(agent_id)
         except (Exception, SystemExit) as error:  # an entry that calls exit() does not end the game; Ctrl-C does
-            return HOLD, (f"raised {type(error).__name__}", describe_error(error))
+            return HOLD, (f"raised {type(error).__name__}", self.code.told(describe_error(error)))
         finally:
             self._reporter.timed(agent_id, time.perf_counter_ns() - started_ns)
         return action, self.code.failed_within(agent_id)

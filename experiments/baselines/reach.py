@@ -359,8 +359,8 @@ class ReachFilter(BatchFilter):
         cap_m = min((table.card.make_grid().cap_m for table in tables), default=math.inf)
         if self.radius_m >= cap_m:
             raise ConfigError(
-                f"the radius to keep is {self.radius_m:g} m with buffer and position error, and the value tables tell "
-                f"distances up to {cap_m:g} m; choose a smaller separation_m"
+                f"the separation to keep is {self.radius_m:g} m with buffer and position error, and the value tables "
+                f"tell distances up to {cap_m:g} m; choose a smaller separation_m"
             )
         rudders = [(row, row[L.MAX_SPEED], row[L.MAX_THRUST], min(row[L.MAX_RUDDER], 100.0)) for row in self.params]
         self.setup = Setup(

@@ -66,7 +66,8 @@ class Player:
             return {"failed": str(error)}
         except BaseException as error:  # foreign code may raise anything
             name = "" if self._team is None else self._team.name
-            return {"failed": f"policy {name!r} cannot {order}: {describe_error(error)}"}
+            text = describe_error(error) if self._team is None else self._team.code.told(describe_error(error))
+            return {"failed": f"policy {name!r} cannot {order}: {text}"}
 
     def _load(self, path: str, options: Mapping[str, Any]) -> dict[str, Any]:
         self._team = team = cast(GuardedTeam, policies.make(path, **options))  # as it makes of paths
@@ -98,7 +99,7 @@ def _ask(code: ForeignCode, answer: Any, agent_id: str) -> dict[str, Any]:
         return {"action": to_plain(action), "ns": spent_ns, "within": code.failed_within(agent_id)}
     except BaseException as error:
         spent_ns = time.perf_counter_ns() - started_ns
-        return {"raised": type(error).__name__, "text": describe_error(error), "ns": spent_ns}
+        return {"raised": type(error).__name__, "text": code.told(describe_error(error)), "ns": spent_ns}
 
 
 class Unreadable:

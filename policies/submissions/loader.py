@@ -189,7 +189,11 @@ class SubmissionCode(ForeignCode):
             kind, text = told(agent_id) or (None, None) if callable(told) else (None, None)
         except Exception:  # another's method of that name
             return None
-        return None if kind is None else (plain_text(kind, 80), plain_text(text, 500))
+        return None if kind is None else (plain_text(kind, 80), plain_text(self.told(str(text)), 500))
+
+    def told(self, text: str) -> str:
+        """Return a text with the submission's own files in place of the copies that ran."""
+        return self.stage.told(text)
 
     def around(self) -> contextlib.AbstractContextManager[Any]:
         """Return a context with the submission's working directory and imports."""
@@ -229,8 +233,7 @@ class SubmissionCode(ForeignCode):
         remedy = ""
         if isinstance(error, ModuleNotFoundError):
             remedy = f"; install {error.name!r} here or put it beside {ENTRY_FILE}"
-        why = describe_error(error).replace(str(self.stage.folder), str(self.stage.source))  # not the copy that ran
-        return PolicyError(f"submission {self.stage.source}: {what}: {why}{remedy}")
+        return PolicyError(f"submission {self.stage.source}: {what}: {self.told(describe_error(error))}{remedy}")
 
 
 def seed_libraries(seed: int) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import difflib
+import os
 import re
 import shutil
 import stat
@@ -51,7 +52,7 @@ class Stage:
             raise PolicyError(no_submission(self.source))
         if not (self.source.is_dir() or self.source.is_file()):  # a pipe may block and a device never end
             raise PolicyError(f"{self.source} is no plain file; give a folder or a zip with {ENTRY_FILE}")
-        top = Path(tempfile.mkdtemp(prefix="steerclear-submission-"))
+        self._top = top = Path(tempfile.mkdtemp(prefix="steerclear-submission-"))
         self._clean = Finalize(self, shutil.rmtree, (top,), {"ignore_errors": True}, exitpriority=0)
         try:
             self.folder = self._fill(top, max_bytes)
@@ -61,13 +62,22 @@ class Stage:
 
     def _fill(self, top: Path, max_bytes: int) -> Path:
         if self.source.is_dir():
-            folder = link_folder(find_entry(self.source, self.source), top)
+            self._entry = find_entry(self.source, self.source)
+            folder = link_folder(self._entry, top)
         else:
             unpack(self.source, top, max_bytes)
             folder = find_entry(top, self.source)
+            self._entry = self.source / folder.relative_to(top)
         with contextlib.suppress(OSError):  # without links, only the template's own paths fail
             (folder / WORKING_DIR).symlink_to(".", target_is_directory=True)
         return folder
+
+    def told(self, text: str) -> str:
+        """Return a text with files of the stage named as files of the source, such as team.zip/folder/helper.py."""
+        for folder, place in ((self.folder, self._entry), (self._top, self.source)):
+            for shown in dict.fromkeys((os.path.realpath(folder), str(folder))):
+                text = text.replace(shown, str(place))
+        return text
 
     def close(self) -> None:
         """Remove the folder; may be called again."""

@@ -73,7 +73,7 @@ def check_radii(problem: Problem, radii_m: tuple[float, ...]) -> None:
     low, high = problem.grid.rho_first_m, 0.8 * problem.grid.cap_m
     for radius in radii_m:
         if not low < radius <= high:
-            raise TableError(f"radius {radius:g} m is outside the table's {low:g} to {high:g} m; choose one within")
+            raise TableError(f"separation {radius:g} m is outside the table's {low:g} to {high:g} m; choose one within")
 
 
 def coarser(problem: Problem, factor: float) -> Problem:

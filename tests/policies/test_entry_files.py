@@ -53,6 +53,33 @@ def test_a_zip_is_unpacked_and_removed(tmp_path):
     stage.close()
 
 
+HELPER = "import os\n\ndef lost():\n    raise RuntimeError('no map at ' + os.path.abspath('map.txt'))\n"
+LOST = "import helper\nclass solution:\n    def compute_action(self, *args):\n        return helper.lost()\n"
+
+
+@pytest.mark.parametrize("folder", ["", "team/"])
+@pytest.mark.parametrize("is_zip", [True, False])
+def test_a_failure_names_the_file_in_the_entry_not_the_copy_that_ran(tmp_path, folder, is_zip, caplog):
+    files = {f"{folder}solution.py": LOST, f"{folder}helper.py": HELPER}
+    source = tmp_path / ("entry.zip" if is_zip else "entry")
+    if is_zip:
+        pack(source, **files)
+    else:
+        (source / folder).mkdir(parents=True)
+        for name, text in files.items():
+            (source / name).write_text(text)
+    team, env = policies.make(str(source)), MctfEnv("aamas2024")
+    observations, infos = env.reset(seed=0)
+    own = list(observations)[:3]
+    team.reset(env, own, 0)
+    team.act({name: observations[name] for name in own}, infos)
+    (failure,) = {one.message for one in team.report().failures}
+    assert f"no map at {source}/{folder}map.txt ({source}/{folder}helper.py:4)" in failure
+    assert "steerclear-submission" not in failure + caplog.text
+    team.close()
+    env.close()
+
+
 def test_the_entry_may_lie_in_the_only_folder_of_a_zip(tmp_path):
     assert "solution.py" in staged(pack(tmp_path / "a.zip", **{"team/solution.py": SOLUTION, "team/b.txt": "b"}))
     with pytest.raises(PolicyError, match="several: one, two"):
@@ -266,6 +293,6 @@ def test_a_policy_of_ones_own_program_tells_it_once_and_refuses(tmp_path, caplog
     path = write_zip(tmp_path / "a.zip", MADE.to_bytes())
     with caplog.at_level(logging.WARNING):
         begin(path, GAME)
-    assert [record.message.count("keeps 2.5 m") for record in caplog.records] == [1]
+    assert caplog.text.count("keeps 2.5 m") == 1
     with pytest.raises(PolicyError, match="or the bare entry with --shield"):
         begin(path, GameConfig.preset("mctf2025"))
