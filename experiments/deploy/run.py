@@ -22,7 +22,7 @@ from steerclear.shield.bridge.control_loop import ControlLoop, Timing
 from steerclear.shield.bridge.drill import Drill, drill_checks
 from steerclear.shield.bridge.feed_packets import FeedSender, PositionPublisher
 from steerclear.shield.bridge.fleet_file import FleetFile
-from steerclear.shield.bridge.link_checks import check_fence, link_checks
+from steerclear.shield.bridge.link_checks import link_checks
 from steerclear.shield.bridge.mavlink.vehicle import MavlinkLink
 from steerclear.shield.bridge.messages import NominalSource, TickSink
 from steerclear.shield.bridge.moos.checks import moos_checks
@@ -170,8 +170,7 @@ def checks_of(session: VehicleSession, minutes: float) -> list[Check]:
     disk = Check("disk", lambda: check_disk(fleet.log_dir, boats=len(fleet.boats), minutes=minutes))
     mavlink = {name: link for name, link in session.links.items() if isinstance(link, MavlinkLink)}
     moos = {name: link for name, link in session.links.items() if isinstance(link, MoosLink)}
-    fences = [Check(f"fence:{name}", partial(check_fence, name, fleet, link)) for name, link in mavlink.items()]
-    links = [*link_checks(mavlink, fleet.platform_of, session.clock), *fences, *moos_checks(moos, fleet)]
+    links = [*link_checks(mavlink, fleet, session.clock), *moos_checks(moos, fleet)]
     fixed = game_obstacles(fleet)
 
     @cache

@@ -22,9 +22,9 @@ from .clock import Clock
 from .fleet_file import FleetFile
 from .mavlink.fence import FenceZone
 from .mavlink.telemetry import ENOUGH_FIX
-from .mavlink.vehicle import LinkHealth, MavlinkLink
+from .mavlink.vehicle import LinkHealth
 from .messages import BoatReading, Link
-from .preflight_checks import Check, CheckResult, Found, checks_by_kind, found
+from .preflight_checks import Check, Found, checks_by_kind, found
 
 CIRCLE_TYPE, POLYGON_TYPE = 2, 4  # bits of FENCE_TYPE; the first bit is altitude
 DEFAULTS = {"FENCE_TYPE": 6.0, "FENCE_RADIUS": 150.0, "FENCE_MARGIN": 2.0, "AVOID_ENABLE": 3.0, "AVOID_MARGIN": 2.0}
@@ -83,23 +83,21 @@ class Watch:
 
 @dataclass(frozen=True)
 class Watched:
-    """What checks look at: a boat of that platform, what it said for a while, and its link at the end of that."""
+    """What checks look at: a boat of a file, what it said for a while, and its link at the end of that."""
 
     boat: str
     readings: list[BoatReading]
     health: LinkHealth
-    platform: Platform
+    fleet: FleetFile
     now_s: float
 
 
-def link_checks(
-    links: Mapping[str, Link], platforms: Mapping[str, Platform], clock: Clock, seconds: float = WATCH_S
-) -> list[Check]:
+def link_checks(links: Mapping[str, Link], fleet: FleetFile, clock: Clock, seconds: float = WATCH_S) -> list[Check]:
     """All of them, of connected links by boat's name; they move no boat. The first watches all for ``seconds``."""
     watch = Watch(links, clock, seconds)
 
     def look(boat: str) -> Watched:
-        return Watched(boat, watch.readings(boat), watch.health(boat), platforms[boat], clock.now_s())
+        return Watched(boat, watch.readings(boat), watch.health(boat), fleet, clock.now_s())
 
     return checks_by_kind(KINDS, links, look)
 
@@ -194,7 +192,7 @@ def check_autopilot(watched: Watched) -> Found:
     top = known.get("WP_SPEED", math.nan)
     timeout = known.get("GUID_TIMEOUT", STANDARD_TIMEOUT_S)
     figures = {"wp_speed_mps": top, "timeout_s": timeout, "fix_type": float(health.fix_type)}
-    faults = parameter_faults(known, watched.platform)
+    faults = parameter_faults(known, watched.fleet.platform_of[watched.boat])
     if health.fix_fault:
         faults.append(f"{health.fix_fault}: wait for a good GPS fix")
     elif health.fix_type < 0:
@@ -224,40 +222,28 @@ def check_commanders(watched: Watched) -> Found:
     )
 
 
-KINDS: Mapping[str, Callable[[Watched], Found]] = {
-    "rates": check_rates,
-    "latency": check_latency,
-    "clock": check_clock,
-    "spread": check_spread,
-    "autopilot": check_autopilot,
-    "commanders": check_commanders,
-}
-"""The checks, by name."""
-
-
-def check_fence(boat: str, fleet: FleetFile, link: MavlinkLink) -> CheckResult:
+def check_fence(watched: Watched) -> Found:
     """The autopilot's own fence is off, or so far out that no boat of ours gets there before it is stopped."""
-    health = link.health()
+    health, fleet, off = watched.health, watched.fleet, "set FENCE_ENABLE to 0"
     known, zones, home_deg = health.parameters, health.fence, health.home_deg
-    name, off = f"fence:{boat}", "set FENCE_ENABLE to 0"
     if known.get("FENCE_ENABLE", 0.0) == 0.0:
-        return CheckResult(name, True, "its own fence is off")
+        return True, "its own fence is off", {}
     value = {**DEFAULTS, **known}
     kinds = int(value["FENCE_TYPE"])
     if answer := sails_by_itself(known, "FENCE_ACTION"):
-        return CheckResult(name, False, answer)
+        return False, answer, {}
     if known.get("FENCE_ACTION") == 0.0:
         text = f"FENCE_ACTION is 0, so its own fence only reports and stops nothing: set it to {HOLD}, or {off}"
-        return CheckResult(name, False, text)
+        return False, text, {}
     if fleet.geofence.then == "flee":
         text = f"geofence.then is flee, so its own fence (FENCE_ENABLE) may take the boat away: {off}, or then: stop"
-        return CheckResult(name, False, text)
+        return False, text, {}
     if (kinds & POLYGON_TYPE and zones is None) or (kinds & CIRCLE_TYPE and home_deg is None):
-        return CheckResult(name, False, f"FENCE_ENABLE is on and its fence cannot be read: {off}, or try again")
+        return False, f"FENCE_ENABLE is on and its fence cannot be read: {off}, or try again", {}
     every = list(zones or ()) if kinds & POLYGON_TYPE else []
     if kinds & CIRCLE_TYPE and home_deg is not None:
         every.append(FenceZone(True, (home_deg,), value["FENCE_RADIUS"]))
-    line, needed = hard_line(fleet), needed_m(fleet, boat, value)
+    line, needed = hard_line(fleet), needed_m(fleet, watched.boat, value)
     room = min((_room_m(zone, line, fleet) for zone in every), default=math.inf)
     where = f"{abs(room):.1f} m {'outside' if room >= 0.0 else 'inside'}"
     fine = f"its own fence lies at least {room:.1f} m outside the hard line, {needed:.1f} m needed to stop"
@@ -265,14 +251,23 @@ def check_fence(boat: str, fleet: FleetFile, link: MavlinkLink) -> CheckResult:
         f"its own fence lies {where} the hard line (geofence.beyond_m {fleet.geofence.beyond_m:g}), and the boat "
         f"needs {needed:.1f} m to stop: move the fence out by {needed - room:.1f} m, or {off}"
     )
-    return CheckResult(
-        name,
-        *found(
-            fine if every else "its own fence is on and has no zones",
-            {"fence_room_m": room, "fence_needed_m": needed} if every else {},
-            (not room >= needed, fault),
-        ),
+    return found(
+        fine if every else "its own fence is on and has no zones",
+        {"fence_room_m": room, "fence_needed_m": needed} if every else {},
+        (not room >= needed, fault),
     )
+
+
+KINDS: Mapping[str, Callable[[Watched], Found]] = {
+    "rates": check_rates,
+    "latency": check_latency,
+    "clock": check_clock,
+    "spread": check_spread,
+    "autopilot": check_autopilot,
+    "commanders": check_commanders,
+    "fence": check_fence,
+}
+"""The checks, by name."""
 
 
 def hard_line(fleet: FleetFile) -> Box:

@@ -41,7 +41,7 @@ from steerclear.shield.bridge.tracker import Tracker
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import get_platform
 
-HERON = get_platform("heron")
+HERON, HERONS = get_platform("heron"), fleet_of()
 GOOD = LinkHealth(
     rates_hz={"GLOBAL_POSITION_INT": 20.0, "ATTITUDE": 20.0},
     missing="",
@@ -81,7 +81,7 @@ def readings(count=100, *, spread_m=0.03, speed=0.0, age=0.05, heading_age=None,
 
 
 def found(check, said=(), **changes):
-    return CheckResult("", *check(Watched("blue_1", said, replace(GOOD, **changes), HERON, 100.0)))
+    return CheckResult("", *check(Watched("blue_1", said, replace(GOOD, **changes), HERONS, 100.0)))
 
 
 class FakeLink:
@@ -101,9 +101,9 @@ class FakeLink:
 def test_a_good_link_passes_everything_and_is_watched_once_whatever_was_refused_before():
     before = [BoatReading("blue_1", 0.0, faults={"no_fix": 9})]
     clock, link = ManualClock(10.0), FakeLink([*before, *readings(1000)])
-    results = run_checks(link_checks({"blue_1": link}, {"blue_1": HERON}, clock, seconds=5.0))
+    results = run_checks(link_checks({"blue_1": link}, HERONS, clock, seconds=5.0))
     assert [r.name for r in results] == [
-        f"{kind}:blue_1" for kind in ("rates", "latency", "clock", "spread", "autopilot", "commanders")
+        f"{kind}:blue_1" for kind in ("rates", "latency", "clock", "spread", "autopilot", "commanders", "fence")
     ]
     assert all(r.passed for r in results), [r.text for r in results]
     assert clock.now_s() == pytest.approx(15.0), "one watch for all checks"
@@ -111,7 +111,7 @@ def test_a_good_link_passes_everything_and_is_watched_once_whatever_was_refused_
 
 
 def test_a_link_that_breaks_while_watched_fails_its_checks_and_says_so():
-    results = run_checks(link_checks({"blue_1": FakeLink(readings(3))}, {"blue_1": HERON}, ManualClock(), 1.0))
+    results = run_checks(link_checks({"blue_1": FakeLink(readings(3))}, HERONS, ManualClock(), 1.0))
     assert not any(r.passed for r in results)
     assert all("the check itself failed (" in r.text for r in results)
 
@@ -242,13 +242,9 @@ def box(out_m, inside=True):
     return FenceZone(inside, places((a, b), (c, b), (c, d), (a, d)))
 
 
-class Fenced:
-    def __init__(self, **health):
-        self.health = lambda: replace(GOOD, **health)
-
-
 def checked(zones, parameters=ON, home=None, fleet=FLEET):
-    return check_fence("blue_1", fleet, Fenced(parameters=parameters, fence=zones, home_deg=home))
+    health = replace(GOOD, parameters=parameters, fence=zones, home_deg=home)
+    return CheckResult("fence", *check_fence(Watched("blue_1", [], health, fleet, 100.0)))
 
 
 def test_the_hard_line_lies_ten_metres_out_and_the_boat_needs_its_way_to_stop():
