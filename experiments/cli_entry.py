@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from rich.markup import escape
 from steerclear import policies
 from steerclear.env.config import GameConfig
 from steerclear.policies.submissions.stage import ENTRY_FILE
@@ -16,10 +17,10 @@ from . import cli_options as o
 from .ablation import quick as small_version
 from .ablation import spec_of
 from .cli_games import end_run, run_games
-from .console import App, finish, progress, say, warn
+from .console import App, err, finish, progress, say, warn
 from .entries.check import always_late, check_entry, headline
 from .entries.report_page import PAGE, EntryGames, entry_report, games_to_look_at, shielded_zip
-from .entries.team import is_entry
+from .entries.team import LOAD_S, is_entry
 from .entries.wrap import wrap_entry
 from .play.match import play_again
 from .play.spec import ANSWER_S
@@ -66,7 +67,8 @@ def check(
     """
     check_path(entry)
     say_of_elsewhere([entry], GameConfig.preset(preset), warn)
-    found = check_entry(entry, preset, max_time, answer_time)
+    with err().status(f"{escape(Path(entry).name)} is loaded, for {LOAD_S:g} s at most, and tried in a game"):
+        found = check_entry(entry, preset, max_time, answer_time)
     say(*check_lines(found))
     write_json(json_file, {"command": "entry check", "versions": versions(), "machine": machine(), **found})
     if found["made_for"] is None and not found["failures"]:

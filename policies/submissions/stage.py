@@ -24,6 +24,8 @@ MAX_FILES = 20_000
 """Most files in a zip."""
 WORKING_DIR = "working_dir"
 """Name under which the competition's own template looks for its files; in the stage it links back to the stage."""
+NO_ENTRIES = ("__MACOSX", "__pycache__")
+"""Folders that machines put beside an entry."""
 DEEP = ("*/*", "*/*/*")
 """Depths searched for the file, only for the message; no deeper, since the given folder may be somebody's home."""
 _CHUNK = 1 << 20
@@ -89,6 +91,7 @@ def find_entry(folder: Path, source: Path) -> Path:
     if (folder / ENTRY_FILE).is_file():
         return folder
     inside = sorted(path.parent for path in folder.glob(f"*/{ENTRY_FILE}") if path.is_file())
+    inside = [path for path in inside if path.name not in NO_ENTRIES]
     if len(inside) != 1:
         found = "several: " + ", ".join(path.name for path in inside) if inside else _deeper(folder)
         raise PolicyError(f"{source} needs one {ENTRY_FILE} at its top, or in its only folder ({found})")
@@ -99,6 +102,9 @@ def _deeper(folder: Path) -> str:
     """Return where the file lies too deep, for a message."""
     found = [path for levels in DEEP for path in folder.glob(f"{levels}/{ENTRY_FILE}") if path.is_file()]
     deep = sorted(path.relative_to(folder).as_posix() for path in found)
+    alike = sorted(path.name for path in folder.glob("*.py") if path.name.lower() == ENTRY_FILE)
+    if alike:
+        return f"{alike[0]} is there; name it {ENTRY_FILE}"
     return "none there" if not deep else f"none there, but {', '.join(deep[:3])}; zip what lies beside it"
 
 

@@ -82,6 +82,10 @@ def test_a_failure_names_the_file_in_the_entry_not_the_copy_that_ran(tmp_path, f
 
 def test_the_entry_may_lie_in_the_only_folder_of_a_zip(tmp_path):
     assert "solution.py" in staged(pack(tmp_path / "a.zip", **{"team/solution.py": SOLUTION, "team/b.txt": "b"}))
+    beside = {"team/solution.py": SOLUTION, "__MACOSX/solution.py": "\x00\x05", "__MACOSX/team/._solution.py": "x"}
+    assert "solution.py" in staged(pack(tmp_path / "mac.zip", **beside))
+    with pytest.raises(PolicyError, match=r"Solution\.py is there; name it solution\.py"):
+        staged(pack(tmp_path / "upper.zip", **{"Solution.py": SOLUTION}))
     with pytest.raises(PolicyError, match="several: one, two"):
         staged(pack(tmp_path / "b.zip", **{"one/solution.py": SOLUTION, "two/solution.py": SOLUTION}))
     with pytest.raises(PolicyError, match="none there"):
