@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import math
 import os
 import struct
@@ -60,7 +61,8 @@ def whole_file(target: Path, error: type[SteerclearError]) -> Iterator[Path]:
         yield part
         os.replace(part, target)
     except OSError as problem:
-        raise error(f"cannot write {target} ({problem}). Choose a folder you may write to.") from problem
+        remedy = "Free space on that disk" if problem.errno == errno.ENOSPC else "Choose a folder you may write to"
+        raise error(f"cannot write {target} ({problem}). {remedy}.") from problem
     finally:
         with suppress(OSError):
             part.unlink(missing_ok=True)
