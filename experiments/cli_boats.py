@@ -22,7 +22,7 @@ from steerclear.shield.bridge.clock import Clock, MonotonicClock
 from steerclear.shield.bridge.feed_packets import GameState
 from steerclear.shield.bridge.fleet_file import FleetFile, load_fleet
 from steerclear.shield.bridge.messages import TickSink
-from steerclear.shield.bridge.moos.links import POLICY as MOOS_POLICY
+from steerclear.shield.bridge.moos import POLICY as MOOS_POLICY
 from steerclear.shield.bridge.operator import Operator
 from steerclear.shield.bridge.preflight_checks import SITUATION, CheckResult, not_passed
 from steerclear.shield.exceptions import ConfigError

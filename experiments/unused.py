@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from steerclear.policies.registry import KEYBOARD
-from steerclear.shield.bridge.moos.links import POLICY as MOOS_POLICY
+from steerclear.shield.bridge.moos import POLICY as MOOS_POLICY
 from steerclear.shield.exceptions import ConfigError
 
 Values = Mapping[str, Any]

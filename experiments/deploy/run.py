@@ -25,8 +25,8 @@ from steerclear.shield.bridge.fleet_file import FleetFile
 from steerclear.shield.bridge.link_checks import link_checks
 from steerclear.shield.bridge.mavlink.vehicle import MavlinkLink
 from steerclear.shield.bridge.messages import NominalSource, TickSink
+from steerclear.shield.bridge.moos import POLICY as MOOS_POLICY
 from steerclear.shield.bridge.moos.checks import moos_checks
-from steerclear.shield.bridge.moos.links import POLICY as MOOS_POLICY
 from steerclear.shield.bridge.moos.links import MoosNominal
 from steerclear.shield.bridge.moos.vehicle import MoosLink
 from steerclear.shield.bridge.operator import Operator

@@ -14,11 +14,10 @@ from ..fleet_checks import MOOS, address_of
 from ..fleet_file import FleetFile
 from ..fleet_settings import BoatSettings, MoosLinkSettings
 from ..messages import Answer, Link, LinkMaker, NominalSource
+from . import POLICY
 from .gates import HelmGate, PidGate
 from .state import MoosContacts
 from .vehicle import MoosLink
-
-POLICY = "moos"  # name of the policy whose commands come from the boats' own communities
 
 
 class MoosLinks(LinkMaker):
