@@ -182,9 +182,9 @@ class OnceCommand(TyperCommand):
             if isinstance(option, TyperOption) and not option.multiple and given.count(option) > 1:
                 joined = ", values joined by commas" if "," in (option.metavar or "") else ""
                 ctx.fail(f"{option.opts[0]} is given twice; give it once{joined}")
-        ctx.allow_extra_args = True  # to be refused in words of ours
+        takes_any, ctx.allow_extra_args = ctx.allow_extra_args, True  # to be refused in words of ours
         extra = list(super().parse_args(ctx, args))
-        if extra:
+        if extra and not takes_any:
             ctx.fail(f"{extra[0]} is one too many; {self._takes()}")
         return extra
 
