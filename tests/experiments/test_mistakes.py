@@ -49,7 +49,7 @@ def workplace(tmp_path, monkeypatch, game_record):
     demo = Path(cli.__file__).parent / "templates" / "demo_fleet.yaml"
     Path("fleet.yaml").write_text(demo.read_text(encoding="utf-8"))
     Path("alone.yaml").write_text(ALONE)
-    Path("tub.yaml").write_text("name: tub\nmax_speed_mps: 2.0\n")
+    Path("one_boat.yaml").write_text("name: tub\nmax_speed_mps: 2.0\n")
     Path("ashore.yaml").write_text(demo.read_text(encoding="utf-8").replace("log_dir: ./logs", "log_dir: text.txt"))
     Path("torn.py").write_text("class Torn(:\n")
     return tmp_path
