@@ -35,10 +35,19 @@ COLUMNS = {
     "hdg": (4, "heading, degrees clockwise from the field's y axis"),
     "m/s": (5, "speed"),
     "age": (5, "seconds since its position was true; red: older than the limit"),
-    "nominal": (9, "what the policy, or a response, requests: speed m/s and heading"),
-    "filtered": (9, "what the shield made of it, as it left; cyan: changed by the shield"),
-    "why": (9, "why the shield sent that, see below; red: the mode that keeps it from obeying"),
-    "margin": (6, "safety margin: how much more room than required its manoeuvre keeps, m; red: less than required"),
+    "nominal": (9, "what the policy, or a response, requests: speed m/s and heading; -: no decision"),
+    "filtered": (
+        9,
+        "what the shield made of it, as it left; cyan: changed by the shield; *not sent*: it did not leave",
+    ),
+    "why": (
+        9,
+        "why it was sent, see below; *undecided*: stopped by its link; red: the mode that keeps it from obeying",
+    ),
+    "margin": (
+        6,
+        "room beyond the required that its manoeuvre keeps, m; red: less than required; *free*: nobody near",
+    ),
     "closest": (14, "whom it meets closest when all hold course, how near and when; yellow: too near"),
     "constraint": (12, "what its command had to give way to"),
 }
