@@ -19,7 +19,7 @@ SAYS = {
     "batched_training": "24 learners",
     "count_collisions": "judged in hindsight: ",
     "draw_barrier": "opponent pursues: h < 0 on 32 m2",
-    "draw_decision": "the best keeps 0.25 m, the shield 0.26 m",
+    "draw_decision": "the best keeps 0.26 m, the shield 0.26 m",
     "first_decision": "BACKUP 111.1 deg",
     "masked_ppo": "12 learners, 17 actions each, ",
     "own_barrier": "nearest: 0.",

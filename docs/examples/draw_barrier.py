@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from steerclear.shield import Commands, Fleet, Shield
 
 PICTURE = sys.argv[1] if len(sys.argv) > 1 and sys.argv[1].endswith((".png", ".svg")) else None
-STEP_M, LEVELS_M = (0.5 if PICTURE else 1.0), (0.0, 1.0, 2.0)  # coarse where only the areas are printed
+STEP_M, LEVELS_M = (0.1 if PICTURE else 1.0), (0.0, 1.0, 2.0)  # coarse where only areas are printed; fine: 3 minutes
 NORTH = Commands.absolute_rad([[2.0, 0.0], [2.0, math.pi]])
 
 

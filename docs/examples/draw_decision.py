@@ -8,11 +8,11 @@ from matplotlib.figure import Figure
 from steerclear.shield import Commands, Fleet, Shield
 from steerclear.shield.platforms import get_platform
 from steerclear.shield.platforms import layout as L
+from steerclear.shield.platforms.actuator import command_for_turn
 from steerclear.shield.platforms.step import step_boat
 
 SEPARATION_M, BUFFER_M, DT_S, HORIZON_S = 2.5, 0.05, 0.1, 6.0
 HERON = get_platform("heron").pack()
-FULL_RUDDER_DEG = 111.1  # 100 % of rudder over 0.9 % for each degree of error
 fleet = Fleet.of(
     position_m=[[0, 0], [0, 5.3]],
     heading_rad=[0, math.pi],
@@ -27,12 +27,11 @@ def roll_out(boat, turn_deg):
     """Positions of a heron that turns by ``turn_deg`` at full rudder and then runs straight on, (steps, 2)."""
     state = np.nan_to_num(fleet.state[boat].copy())
     state[L.THRUST] = 100.0  # at its top speed
-    goal, path = state[L.HEADING] + turn_deg, []
+    left_deg, path = turn_deg, []
     for _ in range(round(HORIZON_S / DT_S)):
-        left = goal - state[L.HEADING]
-        error = math.copysign(FULL_RUDDER_DEG, left) if abs(left) > 15.0 else left
-        step_boat(HERON, state, 2.0, error, DT_S)
-        state[L.HEADING] = goal if abs(goal - state[L.HEADING]) < 1.0 else state[L.HEADING]
+        before_deg = state[L.HEADING]
+        step_boat(HERON, state, 2.0, command_for_turn(HERON, state, 2.0, left_deg, DT_S), DT_S)
+        left_deg -= (state[L.HEADING] - before_deg + 180.0) % 360.0 - 180.0
         path.append(state[[L.X, L.Y]].copy())
     return np.array(path)
 
