@@ -28,7 +28,7 @@ class Reason(IntEnum):
     PASSED = workspace.PASSED
     """The nominal command leaves every boat its backup; it is sent bit for bit."""
     LEAST_CHANGE = workspace.LEAST_CHANGE
-    """The command nearest to the nominal one that satisfies what the backups satisfy. `Decision.solver` names what
+    """A command nearer to the nominal one that satisfies what the backups satisfy. `Decision.solver` names what
     found it; the full boat model has verified it."""
     QP = workspace.LEAST_CHANGE
     """Another name of `LEAST_CHANGE`, for stored data."""
