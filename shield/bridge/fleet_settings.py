@@ -9,7 +9,16 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    PrivateAttr,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+)
 from pydantic.fields import FieldInfo
 
 from .fleet_yaml import short
@@ -101,6 +110,24 @@ class Obstacle(Section):
     )
     circle_m: tuple[Metres, Metres, Length] | None = Field(None, description="give [x, y, radius] in m")
     geojson: Place | None = Field(None, description="give the path of a GeoJSON file")
+    _area: int = PrivateAttr(0)
+    _label: str = PrivateAttr("")
+
+    @property
+    def area(self) -> int:
+        """Number of the area that it bounds, together with others of the same number; negative: a wall bounds none."""
+        return self._area
+
+    @property
+    def label(self) -> str:
+        """Its name, or its place in the file."""
+        return self._label
+
+    def of_area(self, area: int, label: str) -> Obstacle:
+        """The same obstacle with that number and label."""
+        copy = self.model_copy()
+        copy._area, copy._label = area, label
+        return copy
 
 
 class LinkSettings(Section):

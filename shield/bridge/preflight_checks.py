@@ -158,6 +158,29 @@ def check_geofence(fleet: FleetFile, tracker: Tracker, obstacles: StaticObstacle
     )
 
 
+def check_obstacles(fleet: FleetFile, tracker: Tracker, obstacles: StaticObstacles) -> Found:
+    """No boat of ours lies inside an obstacle, or nearer to its edge than the clearance: the edge would keep it in."""
+    needed_m = fleet.shield_config.obstacle_clearance_m
+    places = dict(zip(fleet.names, tracker.seen_now().tolist(), strict=True))
+    seen = {name: places[name][:2] for name in tracker.commanded if math.isfinite(places[name][0])}
+    if not seen:
+        return False, "no boat of ours seen; check telemetry", {}
+    room = [
+        (f"obstacle {area.name}", name, -area.distance_m(*place) if area.holds(*place) else area.distance_m(*place))
+        for name, place in seen.items()
+        for area in obstacles.areas
+    ]
+    inside = [f"{name} lies inside {area}" for area, name, room_m in room if room_m < 0.0]
+    near = [f"{name} lies {room_m:.1f} m from {area}" for area, name, room_m in room if room_m < needed_m]
+    least_m = min((room_m for _, _, room_m in room), default=math.inf)
+    return found(
+        f"boats at least {least_m:.1f} m from all obstacles" if room else "the file has no obstacles",
+        {"least_clearance_m": least_m} if room else {},
+        (inside, f"{', '.join(inside)}: correct the polygon or circle (numbers, order, place), or move the boat"),
+        (near, f"{', '.join(near)}, less than obstacle_clearance_m {needed_m:g}: move it away"),
+    )
+
+
 def check_backup(fleet: FleetFile, tracker: Tracker, obstacles: StaticObstacles) -> Found:
     """Each boat of ours has a backup now: its safety margin is not negative when told to stop."""
     try:
@@ -189,6 +212,7 @@ def check_backup(fleet: FleetFile, tracker: Tracker, obstacles: StaticObstacles)
 SITUATION: Mapping[str, Callable[[FleetFile, Tracker, StaticObstacles], Found]] = {
     "known": check_known,
     "geofence": check_geofence,
+    "obstacles": check_obstacles,
     "backup": check_backup,
 }
 """The checks of the situation, by name."""

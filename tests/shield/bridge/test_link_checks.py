@@ -40,6 +40,7 @@ from steerclear.shield.bridge.preflight_checks import (
 from steerclear.shield.bridge.tracker import Tracker
 from steerclear.shield.exceptions import ConfigError
 from steerclear.shield.platforms import get_platform
+from steerclear.shield.surroundings import Surroundings
 
 HERON, HERONS = get_platform("heron"), fleet_of()
 GOOD = LinkHealth(
@@ -386,9 +387,9 @@ def test_accepting_a_check_for_one_boat_leaves_the_other_and_what_is_not_checked
         validate_accepted(["rate"], checks)
 
 
-def situation(**places):
+def situation(more="", **places):
     """What is found of two own boats and one other at (x, y, heading rad, speed); None: never seen."""
-    fleet, contacts, said = fleet_of(blue=2, red=1), [], {}
+    fleet, contacts, said = fleet_of(blue=2, red=1, more=more), [], {}
     tracker = Tracker(fleet, ["blue_1", "blue_2"])
     for name, place in {"blue_1": (0, 0), "blue_2": (20, 0), "red_1": (40, 0), **places}.items():
         if place is not None:
@@ -421,3 +422,39 @@ def test_a_boat_unseen_outside_or_too_near_or_too_fast_to_part_is_named(places, 
     result = situation(**places)[check]
     assert not result.passed
     assert words in result.text
+
+
+@pytest.mark.parametrize(
+    ("obstacle", "words"),
+    [
+        (
+            "{name: shore, polygon_m: [[-5, -5], [5, -5], [5, 5], [-5, 5]]}",
+            "blue_1 lies inside obstacle shore: correct",
+        ),
+        ("{polygon_m: [[-5, 5], [5, 5], [5, -5], [-5, -5]]}", "blue_1 lies inside obstacle obstacles[0]: correct"),
+        ("{name: rock, circle_m: [1, 0, 2]}", "blue_1 lies inside obstacle rock: correct"),
+        (
+            "{name: rock, circle_m: [2.5, 0, 2]}",
+            "blue_1 lies 0.5 m from obstacle rock, less than obstacle_clearance_m 1",
+        ),
+        ("{name: pier, polygon_m: [[-5, 0.8], [5, 0.8], [5, 5]]}", "blue_1 lies 0.8 m from obstacle pier, less than"),
+        ("{name: all, polygon_m: [[-5, -5], [30, -5], [30, 5], [-5, 5]]}", "blue_2 lies inside obstacle all"),
+    ],
+)
+def test_a_boat_inside_an_obstacle_is_named_and_one_beside_it_is_not(obstacle, words):
+    result = situation(f"obstacles: [{obstacle}]")["obstacles"]
+    assert not result.passed
+    assert words in result.text
+    assert "red_1" not in result.text
+    away = {"blue_1": (0.0, 30.0), "blue_2": (20.0, 30.0), "red_1": (0.0, 0.0)}
+    result = situation(f"obstacles: [{obstacle}]", **away)["obstacles"]
+    assert result.passed
+    assert result.figures["least_clearance_m"] > 20.0
+
+
+def test_obstacles_of_the_rules_count_too():
+    fleet = fleet_of(blue=1, red=0)
+    tracker = Tracker(fleet, ["blue_1"])
+    tracker.update(10.0, {"blue_1": BoatReading("blue_1", 10.0, (0.0, 0.0), 0.0, 0.0, 0.0, 0.0, math.nan, 0.0)}, [])
+    result = check_situation("obstacles", fleet, tracker, Surroundings(circles=[(0.0, 1.0, 4.0)]))
+    assert "blue_1 lies inside obstacle of the rules" in result.text

@@ -76,6 +76,15 @@ BAD = {
         [{"geojson": "none"}],
         r"obstacles\[0\]\.geojson: cannot read none \(No such file [^(]*\); give",
     ),
+    "a line that crosses itself": (
+        [{"name": "bow", "polygon_m": [[0, 0], [10, 10], [10, 0], [0, 10]]}],
+        r"obstacles\[0\] \(bow\): its line crosses itself; give its corners in order",
+    ),
+    "all of the field": (
+        [{"name": "lake", "polygon_m": [[-1, -1], [90, -1], [90, 50], [-1, 50]]}],
+        r"\(lake\) covers the whole field or geofence; correct it; a shore around your water is a GeoJSON LineString",
+    ),
+    "a circle over the geofence": ([{"circle_m": [40, 20, 90]}], r"obstacles\[0\] covers the whole field"),
     "a named one": ([{"name": "pier", "geojson": "none"}], r"obstacles\[0\] \(pier\)\.geojson: cannot read none"),
 }
 
@@ -85,6 +94,39 @@ def test_what_bounds_no_water_is_refused(case):
     obstacles, words = BAD[case]
     with pytest.raises(FleetFileError, match=rf"^[^\n]*{words}[^\n]*$"):
         parse_fleet(text_of(obstacles))
+
+
+@pytest.mark.parametrize(
+    "obstacles",
+    [
+        [{"polygon_m": [[-1, -1], [79, -1], [79, 50], [-1, 50]]}],  # a strip of the field is left
+        [{"polygon_m": [[-9, -9], [90, -9], [90, 50], [50, 50], [50, 9], [45, 9], [45, 50], [-9, 50]]}],  # a basin
+        [{"circle_m": [40, 20, 40]}],
+    ],
+)
+def test_an_obstacle_that_leaves_water_is_taken(obstacles):
+    assert parse_fleet(text_of(obstacles)).obstacles
+
+
+def ring_of(corners):
+    return [[longitude, latitude] for latitude, longitude in places([*corners, corners[0]])]
+
+
+def test_land_with_a_hole_leaves_the_hole_and_a_closed_line_has_no_inside(tmp_path):
+    around = [(-25.0, -25.0), (105.0, -25.0), (105.0, 65.0), (-25.0, 65.0)]
+    hole = [(-10.0, -10.0), (90.0, -10.0), (90.0, 50.0), (-10.0, 50.0)]
+    water = (40.0, 20.0)
+    for content, insides in (
+        ({"type": "Polygon", "coordinates": [ring_of(around), ring_of(hole)]}, [False]),
+        ({"type": "LineString", "coordinates": ring_of(hole)}, [False]),
+        ({"type": "MultiLineString", "coordinates": [ring_of(hole), ring_of(CORNERS)]}, [False, False]),
+    ):
+        geojson(tmp_path, content)
+        found = StaticObstacles(load_fleet(tmp_path / "FLEET.yaml")).areas
+        assert [area.holds(*water) for area in found] == insides
+        assert found[0].distance_m(*water) == pytest.approx(30.0, abs=0.1)
+    with pytest.raises(FleetFileError, match="covers the whole field"):
+        geojson(tmp_path, {"type": "Polygon", "coordinates": [ring_of(around)]})
 
 
 @pytest.mark.parametrize(
