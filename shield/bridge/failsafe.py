@@ -235,8 +235,12 @@ class Failsafe:
     def _judge_alarm(self, alarm: Alarm) -> None:
         """Respond to contradicting sources; `contact.lost_then` applies if the boat's position is unknown.
 
-        Alarms about own boats, which have telemetry, and overridden ones are only shown.
+        Alarms about own boats, which have telemetry, and overridden ones are only shown; a boat that the file does not
+        have is in no doubt, but nobody keeps clear of it.
         """
+        if alarm.unlisted:
+            self._due("contact.unlisted", alarm.boat, alarm.text)
+            return
         subject = alarm.boat or "feed"
         if alarm.boat in self._boats or self._overridden("contact", alarm.boat):
             self._due("contact.doubt", subject, f"{subject}: {alarm.text}", (), response="none")

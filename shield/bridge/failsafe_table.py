@@ -150,6 +150,12 @@ CONDITIONS = {
             "or one to no better than 10 m",
         ),
         Condition(
+            "contact.unlisted",
+            "Somebody tells of a boat that is not in the fleet file: nobody keeps clear of it.",
+            "a fix of it on the feed or a NODE_REPORT in the last 5 s",
+            "`contact.then`, all boats of ours: add it to the file",
+        ),
+        Condition(
             "game.old",
             "The referee is silent.",
             "age of the state of the game",

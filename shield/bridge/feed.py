@@ -46,6 +46,8 @@ FAR_M = 20_000.0  # a boat further from the field than this is an error of the s
 LATE_S = 0.5  # sealed packets later than this, beside the sender's quickest, are told
 MAX_SENDERS, MAX_BOATS, MAX_SOURCES = 64, 256, 8
 """Senders and boats remembered; senders kept of one boat: where more speak at once nobody can tell whom to believe."""
+UNLISTED_S, MOST_UNLISTED = 5.0, 16
+"""A boat that is not in the file is told of for so long after its last fix, s; so many of them at once."""
 GONE_S = 2.0  # a sender silent for so long may begin anew: another start of it, or a lower count, is taken then
 REFEREE_GONE_S = 5.0  # a second referee is listened to once the first has been silent this long
 MOST_AHEAD, REORDERED = 1000, 100
@@ -118,6 +120,7 @@ class FeedReceiver(Closing):
         self._senders: dict[str, _Sender] = {}
         self._contacts: dict[str, dict[str, tuple[Contact, float]]] = {}
         self._crowded_s: dict[str, float] = {}
+        self._unlisted_s: dict[str, float] = {}
         self._rival = ("", -math.inf)
         self._game: GameState | None = None
         self._game_s = -math.inf
@@ -141,13 +144,20 @@ class FeedReceiver(Closing):
         return tuple(contact for contact, _ in found)
 
     def alarms(self) -> Sequence[Alarm]:
-        """Two programs under one name, or more senders of a boat than can be weighed against each other."""
-        gone_s = self._clock.now_s() - GONE_S
+        """Two programs under one name, more senders of a boat than can be weighed, boats not in the file."""
+        now_s = self._clock.now_s()
+        gone_s = now_s - GONE_S
         with self._lock:
             text, at_s = self._rival
             crowded = sorted(boat for boat, crowded_s in self._crowded_s.items() if crowded_s > gone_s)
+            self._unlisted_s = {boat: s for boat, s in self._unlisted_s.items() if now_s - s <= UNLISTED_S}
+            unlisted = [*map(Alarm.of_unlisted, sorted(self._unlisted_s))]
         rivals = [Alarm(f"feed: {text}")] if at_s > gone_s else []
-        return (*rivals, *(Alarm(f"more than {MAX_SOURCES} senders tell of it", boat, lost=True) for boat in crowded))
+        return (
+            *rivals,
+            *unlisted,
+            *(Alarm(f"more than {MAX_SOURCES} senders tell of it", boat, lost=True) for boat in crowded),
+        )
 
     def game(self) -> GameState | None:
         """The latest state of the game; None: none yet."""
@@ -311,11 +321,14 @@ class FeedReceiver(Closing):
             self._referee = (name, now_s)
 
     def _take_fix(self, fix: Fix, source: str, now_s: float, late_s: float) -> None:
+        x_m, y_m = self._frame.to_field_m(fix.latitude_deg, fix.longitude_deg)
+        is_far = not math.hypot(x_m, y_m) <= FAR_M
         has_room = fix.boat in self._contacts or len(self._contacts) < MAX_BOATS
         if not (has_room if self._boats is None else fix.boat in self._boats):
+            if self._boats is not None and not is_far:
+                self._note_unlisted(fix.boat, now_s)
             return self._refuse("unknown boat", f"{source}: boat {fix.boat} is not of this fleet")
-        x_m, y_m = self._frame.to_field_m(fix.latitude_deg, fix.longitude_deg)
-        if not math.hypot(x_m, y_m) <= FAR_M:
+        if is_far:
             return self._refuse("fix", f"{source}: {fix.boat} is {math.hypot(x_m, y_m) / 1e3:.0f} km from the field")
         heading_rad = self._frame.heading_to_field_rad(math.radians(fix.heading_deg))
         fixed_s = now_s - fix.age_s - late_s
@@ -332,6 +345,11 @@ class FeedReceiver(Closing):
                 del by_sender[silent]
             by_sender[source] = (contact, now_s)
         return None
+
+    def _note_unlisted(self, boat: str, now_s: float) -> None:
+        with self._lock:
+            if boat in self._unlisted_s or len(self._unlisted_s) < MOST_UNLISTED:
+                self._unlisted_s[boat] = now_s
 
     def _refuse(self, kind: str, text: str, times: int = 1) -> None:
         with self._lock:

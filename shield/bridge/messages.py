@@ -209,6 +209,12 @@ class Alarm:
     text: str  # one line a person understands
     boat: str = ""  # whose place is in doubt; empty: it is about a source as a whole
     lost: bool = False  # whether nobody can know that place, so that it cannot be kept clear of
+    unlisted: bool = False  # whether the boat is not in the fleet file: then nobody keeps clear of it
+
+    @classmethod
+    def of_unlisted(cls, name: str) -> Alarm:
+        """Somebody tells of a boat that the file does not have."""
+        return cls(f"nobody keeps clear of {name!r}, which is not in the fleet file: add it", name, unlisted=True)
 
 
 @runtime_checkable

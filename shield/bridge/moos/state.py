@@ -187,10 +187,7 @@ class MoosContacts:
         """Boats that report themselves and are not in the fleet file: nobody keeps clear of them."""
         with self._lock:
             self._unlisted_s = {n: s for n, s in self._unlisted_s.items() if self._now_s - s <= UNLISTED_S}
-            return tuple(
-                Alarm(f"{name!r} reports itself and is not in the fleet file: add it, so that boats keep clear of it")
-                for name in sorted(self._unlisted_s)
-            )
+            return tuple(map(Alarm.of_unlisted, sorted(self._unlisted_s)))
 
     def close(self) -> None:
         """Nothing is held."""

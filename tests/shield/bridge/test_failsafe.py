@@ -11,7 +11,7 @@ from bridge_fakes import fleet_of
 from steerclear.shield import Commands
 from steerclear.shield.bridge.failsafe import Failsafe, Seen
 from steerclear.shield.bridge.failsafe_table import CONDITIONS, DISABLES, response_page, response_table
-from steerclear.shield.bridge.messages import Answer, BoatReading
+from steerclear.shield.bridge.messages import Alarm, Answer, BoatReading
 from steerclear.shield.bridge.operator import LONGEST_OVERRIDE_S, Operator, Override
 from steerclear.shield.bridge.tracker import Track, Tracker
 from steerclear.shield.exceptions import ConfigError
@@ -179,6 +179,22 @@ def test_what_its_own_failsafe_took_is_offered_or_taken_back_only_once_that_is_o
     assert verdict.retake == ({"blue_1"} if after == "retake" else set())
     assert ("t takes it back" in text) == (after == "wait")
     assert judged("failsafe", True, position_age_s=1.0)[0].retake == set(), "not while nobody knows where it is"
+
+
+def test_a_boat_that_the_file_does_not_have_slows_all_boats_until_overridden():
+    fleet = fleet_of(blue=2, red=0)
+    failsafe = Failsafe(fleet, Tracker(fleet, ("blue_1", "blue_2")))
+    readings = {name: BoatReading(name, 100.0, heartbeat_age_s=0.0, released=True) for name in fleet.names}
+
+    def judged(*overrides):
+        alarms = (Alarm.of_unlisted("ferry"),)
+        verdict = failsafe.judge(Seen(100.0, readings, Answer(), alarms=alarms, overrides=overrides))
+        return [(a.subject, a.response, a.text) for a in verdict.actions if a.condition == "contact"]
+
+    ((subject, response, text),) = judged()
+    assert (subject, response) == ("ferry", "slow")
+    assert "nobody keeps clear of 'ferry'" in text
+    assert judged(Override("contact", "", 130.0, "key")) == []
 
 
 def test_a_boat_handed_over_is_stopped_by_its_link_until_somebody_takes_it():

@@ -111,6 +111,33 @@ def test_where_our_boats_are_is_published_now_and_then_and_heard_as_it_was_seen(
     assert [fix.boat for fix in sent[-1]] == ["blue_2"], "what nobody knows is not told"
 
 
+def test_a_boat_that_the_file_does_not_have_is_told_of_while_it_is_heard_but_not_by_refused_packets(receiver, keyed):
+    def unlisted(heard):
+        return [alarm.boat for alarm in heard.alarms() if alarm.unlisted]
+
+    receiver.take(positions(contact(boat="ferry"), contact(boat="red_1")), LOCAL)
+    assert unlisted(receiver) == ["ferry"]
+    assert "nobody keeps clear of 'ferry', which is not in the fleet file: add it" in receiver.alarms()[0].text
+    assert [found.boat for found in receiver.read()] == ["red_1"]
+    receiver._clock.sleep_until(104.9)
+    assert unlisted(receiver) == ["ferry"]
+    receiver._clock.sleep_until(105.1)
+    assert unlisted(receiver) == []
+    for packet, host in (
+        (positions(contact(boat="ferry"), seq=1), LOCAL),  # an old one
+        (positions(contact(boat="ferry"), seq=2), "10.0.0.1"),
+        (positions(contact(boat="ferry", latitude_deg=0.0), seq=3), LOCAL),  # on another water
+    ):
+        receiver._senders["hub"].heard_s = receiver._clock.now_s()
+        receiver.take(packet, host)
+        assert unlisted(receiver) == []
+    keyed.take(positions(contact(boat="ferry")), LOCAL)
+    assert unlisted(keyed) == []
+    for k in range(100):
+        receiver.take(positions(contact(boat=f"boat_{k}"), seq=4 + k), LOCAL)
+    assert len(unlisted(receiver)) == 16
+
+
 def test_a_boat_that_is_only_listened_to_is_a_contact_once_it_has_told_all():
     link = FakeLink("red_1", ManualClock(100.0), x=3.0, y=4.0, heading_deg=90.0, speed=1.0)
     (found,) = contacts_heard((), {"red_1": link}, 0.3)

@@ -119,7 +119,7 @@ def test_no_text_breaks_the_reader(text):
 
 def test_a_boat_that_is_not_in_the_file_raises_an_alarm_while_it_reports(contacts):
     contacts.hear(REPORT.format(time=1.0).replace("red_1", "stranger"), "blue_1", 0.0, 1.0)
-    assert "'stranger' reports itself and is not in the fleet file" in contacts.alarms()[0].text
+    assert "nobody keeps clear of 'stranger', which is not in the fleet file: add it" in contacts.alarms()[0].text
     contacts.hear(REPORT.format(time=7.0), "blue_1", 0.0, 7.0)
     assert contacts.alarms() == ()
 
