@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,13 +19,21 @@ from steerclear.env.mctf import MctfEnv
 from steerclear.policies.protocol import TeamPolicy
 from steerclear.shield.barriers.registry import Barrier, get_barrier, takes_values
 from steerclear.shield.exceptions import ConfigError, SteerclearError
+from steerclear.shield.fleet import Fleet
 from steerclear.shield.jit import Array
 from steerclear.shield.platforms import Platform, fresh_state, get_platform, step_boat
 from steerclear.shield.platforms import layout as L
 from steerclear.shield.platforms.files import PlatformFile, parse_platform, to_text
 from steerclear.shield.wrappers import reader_of
+from steerclear.shield.wrappers.checks import check_boats, facts_of
 
-STEPS = 20
+from .reader_motion import Motion
+
+STEPS, MOST_STEPS = 20, 400
+PLAYED_S, HELD_S = 15.0, 1.5
+"""A reader's game is played for so long, and each action held, s."""
+TURNS_DEG, SPEEDS = (20.0, 0.0, -20.0, 60.0, 0.0, -8.0, -60.0, 8.0), (1.0, 1.0, 0.5)
+"""Commands by which a reader's boats are steered: turns, and speeds as shares of the top speed."""
 FALL = 1.05
 """Most a margin may fall by in a metre: 1, as a distance, and a little for curves."""
 FASTEST_MPS = 8.0
@@ -84,46 +93,115 @@ def check_platform(name: str | Platform) -> None:
 
 
 def check_reader(make_env: Callable[[], Any]) -> None:
-    """A reader sees all boats, and lets commands through as they are when nothing filters them.
+    """A reader sees all boats as they move, and lets commands through as they are when nothing filters them.
+
+    Boats have to move along their headings by their speeds, and as their platforms do by the commands: those that
+    ``commands`` reads from actions, and those that ``filtering`` plays in their place.
 
     ``make_env`` builds the environment; each one, reset with the same seed, is the same game. Boats without discrete
     actions play samples of their ``action_space(agent)``.
     """
     if not callable(make_env):
         raise ConfigError(f"make_env is {type(make_env).__name__}; give a function that builds the env: lambda: env")
-    plain, filtered = make_env(), make_env()
-    plain_reader, reader = reader_of(plain), reader_of(filtered)
-    facts, seen, agents = reader.facts(), list[Array](), reader.agent_ids
-    for env in (plain, filtered):
-        env.reset(seed=5)
-    n = len(agents)
-    _hold(len(facts.team) == n == len(facts.radius_m), f"facts are of {len(facts.team)} boats, agent_ids of {n}")
-    moments = {reader.moment()}
+    games = [_Played(make_env()) for _ in range(3)]
+    plain, passed, steered = games
+    steps = min(MOST_STEPS, max(STEPS, round(PLAYED_S / plain.step_s)))
+    for step in range(steps):
+        if not all(game.goes_on() for game in games):
+            break
+        number = step // plain.held
+        actions = {agent: _any_action(plain.env, agent, number + i) for i, agent in enumerate(plain.reader.agent_ids)}
+        nominal = plain.step(actions)
+        passed.step(actions, lambda commands: commands)
+        steered.step(actions, partial(steered.turning, number))
+        fleet, same = (game.motion.fleets[-1] for game in (plain, passed))
+        alike = np.array_equal(fleet.state, same.state, equal_nan=True)  # what a fleet does not know is NaN
+        _hold(
+            alike,
+            "the game is another one under a filter that changes nothing; play what safe leaves as it is as it came",
+        )
+        passed.check_handed_over(nominal)
+    for game, source in ((plain, "commands() reads from the actions"), (steered, "filtering plays")):
+        _hold(len(game.moments) == len(game.motion.fleets), "moment() is the same after a step; give the game's time")
+        fault = game.motion.fault(source)
+        _hold(not fault, fault)
+    for team in (0, 1):
+        plain.reader.surroundings(team, True)
 
-    def passing(commands: Array) -> Array:
-        seen.append(np.array(commands))
+
+class _Played:
+    """A game that `check_reader` plays, and what its reader says of it."""
+
+    def __init__(self, env: Any) -> None:
+        self.env, self.reader = env, reader_of(env)
+        facts = facts_of(self.reader)
+        check_boats(env, self.reader.agent_ids, self.reader)
+        self.step_s = facts.moves * facts.dt_s
+        self.held = max(1, round(HELD_S / self.step_s))
+        self.motion, self.given = Motion(self.step_s, facts.moves), list[Array]()
+        env.reset(seed=5)
+        self.moments = {self.reader.moment()}
+        self._see()
+
+    def goes_on(self) -> bool:
+        """Return whether the game has boats left that act."""
+        return bool(getattr(self.env, "agents", True))
+
+    def step(self, actions: dict[str, Any], safe: Callable[[Array], Array] | None = None) -> Array:
+        """Play the actions, all commands by way of ``safe`` where one is given; return the commands that are played."""
+        commands = np.array(self.reader.commands(actions), dtype=np.float64)
+        if safe is None:
+            self.env.step(self.reader.playable(actions))
+        else:
+            commands = self._filtered(actions, safe)
+        self.motion.commands.append(commands)
+        self._see()
+        self.moments.add(self.reader.moment())
         return commands
 
-    for step in range(STEPS):
-        actions = {agent: _any_action(plain, agent, step + i) for i, agent in enumerate(agents)}
-        plain.step(plain_reader.playable(actions))
-        with reader.filtering(passing):
-            filtered.step(reader.playable(actions))
-        fleet, same = plain_reader.fleet(0, True), reader.fleet(0, True)
-        _hold(len(fleet.names) == n and bool(np.isfinite(fleet.state[:, : L.SPEED + 1]).all()), "a fleet lacks boats")
-        alike = np.array_equal(fleet.state, same.state, equal_nan=True)  # what a fleet does not know is NaN
-        _hold(alike, "the game is another one under a filter that changes nothing")
-        moments.add(reader.moment())
-    _hold(len(moments) == STEPS + 1, "moment() is the same after a step; give the game's time")
-    _hold(bool(seen) and all(c.shape == (n, 2) for c in seen), f"filtering hands over no commands of shape ({n}, 2)")
-    for team in (0, 1):
-        reader.surroundings(team, True)
+    def _filtered(self, actions: dict[str, Any], safe: Callable[[Array], Array]) -> Array:
+        n, played = len(self.reader.agent_ids), list[Array]()
+        self.given.clear()
+
+        def noting(commands: Array) -> Array:
+            self.given.append(np.array(commands))
+            _hold(self.given[-1].shape == (n, 2), f"filtering hands over no commands of shape ({n}, 2)")
+            played.append(np.array(safe(commands)))
+            return played[-1].copy()
+
+        with self.reader.filtering(noting):
+            self.env.step(self.reader.playable(actions))
+        _hold(bool(played), "filtering never calls safe; let step play safe(commands) before the boats move")
+        return played[0]
+
+    def check_handed_over(self, nominal: Array) -> None:
+        """Hold that ``safe`` was given what ``commands`` reads, of the boats that the game does not drive."""
+        free = self.motion.free[-1] & self.motion.free[-2]
+        same = np.allclose(self.given[0][free], nominal[free], rtol=1e-3, atol=1e-3)
+        _hold(same, "filtering hands over other commands than commands() reads from the same actions; give it those")
+
+    def turning(self, number: int, nominal: Array) -> Array:
+        """Return commands that turn the boats both ways, ``number`` for ``number``, at half and full speed."""
+        commands = np.array(nominal)
+        for i, kind in enumerate(self.motion.fleets[0].platforms):
+            share, turn_deg = (of[(number + i) % len(of)] for of in (SPEEDS, TURNS_DEG))
+            commands[i] = share * get_platform(kind).max_speed_mps, turn_deg
+        return commands
+
+    def _see(self) -> None:
+        fleet, n = self.reader.fleet(0, True), len(self.reader.agent_ids)
+        whole = isinstance(fleet, Fleet) and len(fleet) == n and np.isfinite(fleet.state[:, : L.SPEED + 1]).all()
+        _hold(bool(whole), f"fleet() lacks boats, or values of them; give a Fleet of the {n} boats of agent_ids")
+        free = [self.reader.fleet(team, False).controlled for team in (0, 1)]
+        self.motion.see(fleet, free[0] | free[1])
 
 
 def _any_action(env: Any, agent: str, number: int) -> Any:
     """Return an action for a boat: a whole number, or a sample where its action space is known to be another."""
     space = env.action_space(agent) if callable(getattr(env, "action_space", None)) else None
-    if space is None or isinstance(space, Discrete):
+    if isinstance(space, Discrete):
+        return int(space.start + number % space.n)
+    if space is None:
         return number % 16
     space.seed(number)
     return space.sample()

@@ -7,7 +7,9 @@ from functools import partial
 from importlib.util import find_spec
 
 import numpy as np
+from steerclear.env.mctf import MctfEnv
 from steerclear.shield import Shield, ShieldConfig
+from steerclear.shield.wrappers import ShieldedParallelEnv
 
 from . import oracle
 from .play.match import play_match
@@ -22,8 +24,17 @@ def compile_shield() -> None:
 
 
 def compile_game() -> None:
-    """Compile what a game needs."""
+    """Compile what a game needs, played by us and stepped by others."""
     play_match(SHORT_GAME)
+    env = MctfEnv("aamas2024")
+    env.reset(seed=0)
+    env.step(dict.fromkeys(env.agents, 4))
+
+
+def compile_masks() -> None:
+    """Compile the masks of actions that learners ask for."""
+    env = ShieldedParallelEnv(MctfEnv("aamas2024"), Shield(), masks=True)
+    env.reset(seed=0)
 
 
 def compile_judge() -> None:
@@ -87,6 +98,7 @@ PARTS: dict[str, Callable[[], object]] = {
     "the shield": compile_shield,
     "the shield, each boat by itself": lambda: Shield(ShieldConfig(coordination="per_boat")).warm_up(),
     "the game": compile_game,
+    "masks of actions": compile_masks,
     "the judge": compile_judge,
     "boats": compile_boats,
     "fits of boats": compile_fit,

@@ -19,15 +19,20 @@ from .workspace import LARGEST_COMMAND
 ROUNDING_MPS = 1e-6
 """A speed beyond the limit by at most this is the limit, rounded: it passes unchanged."""
 
+FASTEST_MPS = 50.0
+"""Speeds beyond this are those of no boat, m/s: headings, probably."""
+
 LARGEST_HEADING_RAD = 1e6
 """Absolute headings beyond this, rad, are not valid: too little of the angle is left in a float."""
 
 
 @kernel
 def _any_beyond(values: Array, who: BoolArray, highest_mps: Array) -> bool:
-    """Return whether a speed of boats of ``who`` is beyond what their platforms do."""
+    """Return whether a speed of boats of ``who`` is beyond what their platforms do, or any beyond what boats do."""
     for i in range(values.shape[0]):
         if who[i] and (values[i, 0] > highest_mps[i] + ROUNDING_MPS or values[i, 0] < -ROUNDING_MPS):
+            return True
+        if abs(values[i, 0]) > FASTEST_MPS:
             return True
     return False
 
@@ -134,6 +139,7 @@ class Commands:
         if self.of_game or not _any_beyond(self.values, controlled, highest_mps):
             return self, None
         speed = self.values[:, 0]
+        _hint_at_swapped_columns(names, speed, ~controlled)
         cut: BoolArray = controlled & ((speed > highest_mps + ROUNDING_MPS) | (speed < -ROUNDING_MPS))
         cut &= (np.abs(self.values) <= LARGEST_COMMAND).all(axis=1)
         if not cut.any():
@@ -152,6 +158,18 @@ class Commands:
             half = np.copysign(180.0, values[far, 1])
             values[far, 1] = np.fmod(values[far, 1] + half, 360.0) - half
         return self._alike(values), cut
+
+
+def _hint_at_swapped_columns(names: tuple[str, ...], speed_mps: Array, who: BoolArray) -> None:
+    """Warn once if speeds of boats of ``who``, which the shield passes through, look like headings."""
+    absurd = who & (np.abs(speed_mps) > FASTEST_MPS)
+    if absurd.any():
+        first = int(np.argmax(absurd))
+        say_once(
+            "speed of others",
+            f"a speed of {speed_mps[first]:g} m/s is given for boat {names[first]!r}; rows are (speed m/s, heading), "
+            "in this order",
+        )
 
 
 def _rows(values: ArrayLike) -> Array:

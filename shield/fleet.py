@@ -177,6 +177,12 @@ class Fleet:
         )
         fleet.check()
         _check_given(fleet)
+        if controlled is None and n and not fleet.controlled.any():
+            say_once(
+                "controlled",
+                f"no boat is controlled: by default those of team 0 are, and teams here are {np.unique(teams).tolist()}"
+                "; give team 0 to the own boats, or controlled=",
+            )
         return fleet
 
     def __len__(self) -> int:

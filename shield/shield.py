@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from . import workspace as W
+from .arrays import say_once
 from .autopilots import Autopilots, all_known, to_turn, unknown_memory
 from .backup.paths import SAG_M
 from .barriers.registered import RegisteredBarriers
@@ -32,6 +33,9 @@ from .renamed import takes_old_keywords
 from .surroundings import OPEN_WATER, Surroundings, uncertainty_m
 from .tracks import carry_over, steps_of_delay, who_stayed
 from .workspace import Scene, Static
+
+JUMP_M, JUMP_MPS = 20.0, 50.0
+"""An own boat that is farther than this from where it was, plus what no boat moves in the time, was put elsewhere."""
 
 NOMINAL = slice(W.NOMINAL_SPEED, W.NOMINAL_TURN + 1)
 """Columns of nominal commands in what is given."""
@@ -327,7 +331,14 @@ class Shield:
         if not len(fleet):
             return
         nominal = within.as_relative_deg(fleet.state[:, L.HEADING])
-        _write_fresh(given[0], state, fleet.controlled, nominal, order)
+        far_m = JUMP_M + self.config.dt_s * JUMP_MPS
+        jumped = _write_fresh(given[0], state, fleet.controlled, nominal, order, far_m)
+        if jumped >= 0:
+            say_once(
+                "jumped",
+                f"boat {fleet.names[jumped]!r} is more than {far_m:g} m from where it was a decision "
+                f"ago, {self.config.dt_s:g} s; call reset() after a pause, or when boats begin elsewhere",
+            )
         for column, told in (
             (W.VISITING, fleet.visiting),
             (W.AGE_S, fleet.age_s),
@@ -374,16 +385,25 @@ class Shield:
 
 
 @kernel
-def _write_fresh(given: Array, state: Array, ours: BoolArray, nominal: Array, order: IntArray) -> None:
-    """Write boats in that order into ``given``, (n, N_GIVEN): tracks fresh and exact, and nothing else known."""
+def _write_fresh(given: Array, state: Array, ours: BoolArray, nominal: Array, order: IntArray, far_m: float) -> int:
+    """Write boats in that order into ``given``, (n, N_GIVEN): tracks fresh and exact, and nothing else known.
+
+    Returns:
+        A boat of ``ours``, then and now, that is farther than ``far_m`` from where ``given`` had it; -1: none.
+    """
+    jumped = -1
     for k in range(order.shape[0]):
         i = order[k]
+        east_m, north_m = state[i, L.X] - given[k, L.X], state[i, L.Y] - given[k, L.Y]
+        if ours[i] and given[k, W.OURS] != 0.0 and east_m * east_m + north_m * north_m > far_m * far_m:
+            jumped = i
         given[k, :] = 0.0
         copy_row(given[k], state[i])
         given[k, W.OURS] = 1.0 if ours[i] else 0.0
         given[k, W.NOMINAL_SPEED], given[k, W.NOMINAL_TURN] = nominal[i, 0], nominal[i, 1]
         given[k, W.HORIZON_S] = np.nan
         given[k, W.DRIVEN :] = np.nan
+    return jumped
 
 
 def _check(fleet: Fleet, nominal: Commands, config: ShieldConfig) -> None:

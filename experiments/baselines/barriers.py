@@ -10,11 +10,13 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 from steerclear.shield.calls import checked_calls
-from steerclear.shield.exceptions import ConfigError
+from steerclear.shield.exceptions import ConfigError, PlatformError
 from steerclear.shield.jit import Array
+from steerclear.shield.platforms import get_platform
 
 from .own_filters import Jet, check_gains, check_jet, name_of
 
@@ -56,6 +58,7 @@ class Barrier:
         for gains in self.tried:
             check_gains(gains, "one of tried", None if gains is self.tried[0] else self.count)
         for platform, gains in self.tuned.items():
+            _check_known(platform)
             check_gains(gains, f"tuned[{platform!r}]", self.count)
 
     @property
@@ -66,6 +69,14 @@ class Barrier:
     def of(self, p: Array, v: Array, radius_m: float, gains: Sequence[Array]) -> Jet:
         """Return what ``jet`` gives; ConfigError where it takes other arguments or gives something else."""
         return check_jet(self.jet, p, v, radius_m, gains)
+
+
+def _check_known(platform: Any) -> None:
+    """Refuse (ConfigError) gains of a platform that nobody knows, which no boat would use."""
+    try:
+        get_platform(platform)
+    except PlatformError as error:
+        raise ConfigError(f"tuned[{platform!r}]: {error}; register a platform of your own before") from None
 
 
 def dot(a: Array, b: Array) -> Array:

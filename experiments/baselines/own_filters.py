@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from steerclear.shield.arrays import say_once
 from steerclear.shield.exceptions import ConfigError, FleetError
 from steerclear.shield.jit import Array
 
@@ -133,7 +134,23 @@ def check_jet(
     if [_shape_of(one) for one in given] != [p.shape[1:], p.shape, p.shape]:
         raise ConfigError(f"the barrier's function {who} returned {', '.join(shapes) or 'nothing'}; {expected}")
     h, h_p, h_v = map(np.asarray, given)
+    _hint_at_no_numbers(who, p, h, h_p, h_v)
     return h, h_p, h_v
+
+
+def _hint_at_no_numbers(who: str, p: Array, h: Array, h_p: Array, h_v: Array) -> None:
+    """Warn once of a barrier without a value, or with an endless gradient, of two different boats."""
+    unknown = np.isnan(h) | ~np.isfinite(h_p).all(axis=0) | ~np.isfinite(h_v).all(axis=0)
+    if p.ndim == 4:
+        unknown = unknown & ~np.eye(p.shape[-1], dtype=np.bool_)  # of a boat and itself nothing is asked
+    if unknown.any():
+        east_m, north_m = (float(part[unknown][0]) for part in p)
+        say_once(
+            f"no number of {who}",
+            f"the barrier's function {who} returned what is no number (h or a gradient) for p = ({east_m:.3g}, "
+            f"{north_m:.3g}) m, and boats stop there; give numbers everywhere: bound roots and divisors from below, as "
+            "`tangent` in baselines.barriers does",
+        )
 
 
 def check_gains(gains: Any, what: str, count: int | None = None) -> None:

@@ -252,7 +252,10 @@ def play(scenes: Scenes, safety_filter: str | FilterMaker | SafetyFilter, condit
         filtered[:] = np.where(ours[..., None], check_answer(decider, answer, shape), nominal)
         if not np.isfinite(filtered).all():
             b, i, _ = np.argwhere(~np.isfinite(filtered))[0]
-            raise FleetError(f"step {step}: the command for boat {i} of game {b} is not finite: {filtered[b, i]}")
+            raise FleetError(
+                f"step {step}: the command for boat {i} of game {b} is not finite: {filtered[b, i]}; let decide return "
+                "a speed, m/s, and a turn, deg, for each boat of ours: nominal where it finds none"
+            )
         played.reason[step], played.safety_margin_m[step] = check_account(decider, shape)
         move(world, filtered, step)
         played.state[step + 1] = world.state

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dis
 import inspect
 import math
 from collections.abc import Callable, Sequence
@@ -58,6 +59,13 @@ class Barrier:
         if not callable(self.margin) or not (self.slope is None or callable(self.slope)):
             raise ConfigError(f"margin and slope of barrier {self.name!r} must be functions {FORMS}")
         takers = [takes_values(self.name, part) for part in (self.margin, self.slope) if part is not None]
+        reading = [part for part in (self.margin, self.slope) if part is not None and _reads_values(part)]
+        if reading and isinstance(self.values, tuple) and not self.values:
+            name = getattr(reading[0], "__name__", "margin")
+            raise ConfigError(
+                f"{name} of barrier {self.name!r} reads values, and there are none; give values= (a tuple, or a "
+                "function that returns the numbers of now), or define it with (x_m, y_m, ahead_s)"
+            )
         if not any(takers) and self.values != ():
             raise ConfigError(f"barrier {self.name!r} has values that no function takes; add the argument values")
         if isinstance(self.values, (list, np.ndarray)):
@@ -102,6 +110,16 @@ def takes_values(name: str, function: Callable[..., object]) -> bool:
             continue
         return count == 4
     raise ConfigError(f"a function of barrier {name!r} takes {signature}; define it with {FORMS}")
+
+
+def _reads_values(function: Callable[..., object]) -> bool:
+    """Return whether a function uses its fourth argument; False of one whose code cannot be looked at."""
+    code = getattr(getattr(function, "py_func", function), "__code__", None)
+    if code is None or code.co_argcount < 4 or inspect.ismethod(function):
+        return False
+    name = code.co_varnames[3]
+    parts = (part.argval for part in dis.get_instructions(code) if not part.opname.startswith("STORE"))
+    return any(name == part or (isinstance(part, tuple) and name in part) for part in parts)
 
 
 Given = TypeVar("Given", bound="Barrier | Callable[[], Barrier]")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from numbers import Integral
 from typing import Any
 
@@ -35,8 +35,46 @@ def settings_of(game: Any) -> dict[str, float]:
         ConfigError: the game cannot be read, or has settings that no shield can be built for.
     """
     if hasattr(game, "core") or not hasattr(game, "n_games"):
-        return reader_of(game).facts().settings()
+        return facts_of(reader_of(game)).settings()
     return facts_of_games(game).settings()
+
+
+def facts_of(reader: GameReader) -> GameFacts:
+    """Return the facts of a reader's game, checked.
+
+    Raises:
+        ConfigError: they are no `GameFacts`, or not of the boats of ``agent_ids``.
+    """
+    facts = _facts_now(reader)
+    faults = facts.faults(len(reader.agent_ids))
+    if faults:
+        raise ConfigError(f"facts() of the reader {type(reader).__name__}: {faults}")
+    return facts
+
+
+def _facts_now(reader: GameReader) -> GameFacts:
+    facts: Any = reader.facts()
+    if not isinstance(facts, GameFacts):
+        raise ConfigError(
+            f"facts() of the reader {type(reader).__name__} gave a {type(facts).__name__}; return a GameFacts("
+            "dt_s=..., radius_m=..., team=..., obstacles=...)"
+        )
+    return facts
+
+
+def check_boats(env: Any, boats: Sequence[str], reader: GameReader) -> None:
+    """Refuse boats of a reader that are no agents of its game, where the game names its agents.
+
+    Raises:
+        ConfigError: see above.
+    """
+    agents = [str(agent) for agent in getattr(env, "possible_agents", ())]
+    unknown = [boat for boat in boats if boat not in agents]
+    if agents and unknown:
+        raise ConfigError(
+            f"agent_ids of the reader {type(reader).__name__} holds {', '.join(unknown)}, which the game has not; it "
+            f"has {', '.join(agents)}"
+        )
 
 
 def team_number(team: str | int) -> int:
@@ -129,7 +167,7 @@ class ShieldedGame:
 
     def _fit(self) -> None:
         """Fit the shield to the game's settings and copy them, so that later changes can be noticed."""
-        facts = self.reader.facts()
+        facts = facts_of(self.reader)
         config = getattr(self.shield, "config", None)
         if isinstance(config, ShieldConfig):
             better = fitting(config, facts, self.team, self._held)
@@ -145,7 +183,7 @@ class ShieldedGame:
         Raises:
             ConfigError: the settings have changed, no shield can be built for them, or the shield serves someone else.
         """
-        now = self.reader.facts()
+        now = _facts_now(self.reader)
         for name in GameFacts._fields:
             then, found = getattr(self._facts, name), getattr(now, name)
             if not np.array_equal(then, found):
@@ -155,7 +193,11 @@ class ShieldedGame:
 
     def seen(self) -> tuple[Fleet, Surroundings]:
         """Return the boats as they are, and their surroundings."""
-        fleet = self.reader.fleet(self.team, self.shield_autopilot)
+        fleet, n = self.reader.fleet(self.team, self.shield_autopilot), len(self.reader.agent_ids)
+        if not isinstance(fleet, Fleet) or len(fleet) != n:
+            found = f"{len(fleet)} boats" if isinstance(fleet, Fleet) else f"a {type(fleet).__name__}"
+            who = type(self.reader).__name__
+            raise ConfigError(f"fleet() of the reader {who} gave {found}; return a Fleet of the {n} boats of agent_ids")
         return fleet, self.reader.surroundings(self.team, self.keep_out)
 
     def decide(self, commands: Array) -> Decisions:

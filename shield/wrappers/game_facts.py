@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..arrays import NoNumbersError, numbers
 from ..config import DefaultDistance, ShieldConfig
 from ..exceptions import ConfigError
 from ..jit import Array, IntArray
@@ -43,20 +44,47 @@ class GameFacts(NamedTuple):
         """Number of substeps for one action of a policy."""
         return max(1, round(self.decision_s / self.dt_s))
 
+    def faults(self, boats: int) -> str:
+        """Return what is wrong with these settings of so many boats, and the remedy; empty: nothing."""
+        for name in ("radius_m", "team"):
+            shape = np.shape(getattr(self, name))
+            if shape != (boats,):
+                return f"{name} has shape {shape}; give one entry for each of the {boats} boats of agent_ids"
+        for name, values, least in (("dt_s", self.dt_s, 1e-6), ("radius_m", self.radius_m, 0.0)):
+            if not _are_numbers(values, least):
+                return f"{name} is {_plain(values)!r}; give finite numbers of at least {least:g}"
+        if not _are_numbers(self.decision_s, 0.0):
+            return f"decision_s is {self.decision_s!r}; give s, or 0 where it is dt_s"
+        if not np.isin(self.team, (0, 1)).all():
+            return f"team is {_plain(self.team)}; number the teams 0 and 1"
+        return ""
+
     def distances(self, team: int | None = None) -> dict[str, float]:
         """Return the distances, m, at which boats collide with each other and with obstacles; 0: never.
 
         Each is the largest over the boats of the team (None: of both teams).
         """
-        ours = np.ones(len(self.team), bool) if team is None else self.team == team
+        radius_m, teams = np.asarray(self.radius_m, dtype=np.float64), np.asarray(self.team)
+        ours = np.ones(len(teams), bool) if team is None else teams == team
         pairs = ours[:, None] & ~np.eye(len(ours), dtype=bool)
-        collision_m = float((self.radius_m[:, None] + self.radius_m)[pairs].max(initial=0.0))
-        clearance_m = float(self.radius_m[ours].max(initial=0.0)) if self.obstacles else 0.0
+        collision_m = float((radius_m[:, None] + radius_m)[pairs].max(initial=0.0))
+        clearance_m = float(radius_m[ours].max(initial=0.0)) if self.obstacles else 0.0
         return {"separation_m": collision_m, "obstacle_clearance_m": clearance_m}
 
     def settings(self) -> dict[str, float]:
         """Return the settings of a shield for this game, by name."""
         return {"dt_s": self.dt_s, **{name: metres for name, metres in self.distances().items() if metres > 0.0}}
+
+
+def _are_numbers(values: Any, least: float) -> bool:
+    try:
+        return bool((np.isfinite(numbers(values)) & (numbers(values) >= least)).all())
+    except NoNumbersError:
+        return False
+
+
+def _plain(values: Any) -> Any:
+    return values.tolist() if isinstance(values, np.ndarray) else values
 
 
 def facts_of_games(core: Any) -> GameFacts:

@@ -16,11 +16,11 @@ from ..jit import Array
 from ..platforms import get_platform
 from ..shield import Shield
 from .actions import DISCRETE
-from .checks import SIDES, ShieldedGame, layers_of, one_game_shield, team_number, words_of
-from .readers import GameReader, reader_of
+from .checks import SIDES, ShieldedGame, check_boats, facts_of, layers_of, one_game_shield, team_number, words_of
+from .readers import GameReader, check_members, reader_of
 
 logger = logging.getLogger(__name__)
-_OWN = ("env", "masks", "decisions", "_game", "_own", "_said", "_forgotten")
+_OWN = ("env", "masks", "decisions", "_game", "_own", "_said", "_forgotten", "_decided")
 """Attributes of the wrapper itself."""
 
 
@@ -68,12 +68,15 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         _check_parallel(env)
         super().__init__(env)
         number, found = team_number(team), reader_of(env) if reader is None else reader
+        check_members(found)
         _check_not_shielded(env, number, one_game_shield(shield))
         self._game = ShieldedGame(shield, found, number, shield_autopilot, keep_out)
         self.masks = masks
-        self._own = {agent for agent, of in zip(found.agent_ids, found.facts().team, strict=True) if of == number}
+        self._own = {agent for agent, of in zip(found.agent_ids, facts_of(found).team, strict=True) if of == number}
+        _check_in_game(env, number, self._own, found)
         self._said: set[str] = set()
         self._forgotten = np.zeros(len(found.agent_ids), np.bool_)
+        self._decided = False
         self.decisions: Decisions | None = None
 
     @property
@@ -111,12 +114,19 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         """Play one step. The shield changes unsafe commands of its team before the boats move.
 
         Raises:
-            ConfigError: the env's settings have changed since its reset, or the shield has begun to serve someone else.
+            ConfigError: the env's settings have changed since its reset, the shield has begun to serve someone else, or
+                the reader moved the boats without asking it.
         """
         self._game.check()
         self._note_forgotten(actions)
+        over, self._decided = not getattr(self.env, "agents", True), False
         with self.reader.filtering(self._safe):
             outcome = self.env.step(actions)
+        if not (self._decided or over):
+            raise ConfigError(
+                f"filtering of the reader {type(self.reader).__name__} never called safe in this step, so that boats "
+                "play bare; let it play safe(commands) before the boats move, see GameReader.filtering"
+            )
         infos = outcome[-1]
         if self.decisions is not None:
             for i, agent in self._covered(self.decisions.fleet.team, infos):
@@ -139,7 +149,7 @@ class ShieldedParallelEnv(BaseParallelWrapper[str, Any, Any]):  # type: ignore[m
         forgotten = self._forgotten & ~np.asarray(commands).any(axis=1)  # boats that the game drives have its commands
         if forgotten.any():
             commands = np.where(forgotten[:, None], np.nan, commands)
-        self.decisions = self._game.decide(commands)
+        self.decisions, self._decided = self._game.decide(commands), True
         sent = self.decisions.filtered.values
         return np.where(np.isnan(sent), 0.0, sent) if forgotten.any() else sent  # nan: of those it does not decide for
 
@@ -179,6 +189,13 @@ def _check_parallel(env: Any) -> None:
             f"{type(env).__name__} is an AEC env, in which boats act in turn, and the shield decides for all at once; "
             "wrap the parallel env: parallel_to_aec(ShieldedParallelEnv(mctf_v0.parallel_env(...), Shield()))"
         )
+
+
+def _check_in_game(env: Any, team: int, own: set[str], reader: GameReader) -> None:
+    """Refuse a team without boats, and boats of it that are no agents of the game: they get no decisions."""
+    if not own:
+        raise ConfigError(f"the reader {type(reader).__name__} has no boat of team {SIDES[team]}; shield the other one")
+    check_boats(env, sorted(own), reader)
 
 
 def _check_not_shielded(env: Any, team: int, shield: Any) -> None:

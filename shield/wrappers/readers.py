@@ -75,7 +75,16 @@ def game_reader(fits: Callable[[Any], bool]) -> Callable[[Build], Build]:
 
     Args:
         fits: returns whether this reader reads an environment, given without its wrappers.
+
+    Raises:
+        ConfigError: ``fits`` is no such function: the decorator stands without brackets.
     """
+    if isinstance(fits, type) or not callable(fits):
+        found = f"the class {fits.__name__}" if isinstance(fits, type) else repr(fits)
+        raise ConfigError(
+            f"game_reader was given {found}, not fits=; write @game_reader(fits=lambda env: isinstance(env, MyEnv)) "
+            "above the reader's class"
+        )
 
     def register(build: Build) -> Build:
         _REGISTERED[fits] = build
@@ -88,19 +97,38 @@ def reader_of(env: Any) -> GameReader:
     """Return the reader for an environment. The reader registered last is tried first.
 
     Raises:
-        ConfigError: no reader fits, or one lacks a member of `GameReader`.
+        ConfigError: no reader fits, or one lacks a member of `GameReader` or names boats that the game does not have.
     """
     load_others(GROUP)
     base = getattr(env, "unwrapped", env)
     for fits, build in reversed(_REGISTERED.items()):
         if fits(base):
             reader = build(base)
-            missing = sorted(name for name in _MEMBERS if not hasattr(reader, name))
-            if missing:
-                raise ConfigError(f"the reader {type(reader).__name__} has no {', '.join(missing)}; see GameReader")
+            check_members(reader)
             return reader
     raise ConfigError(
         f"cannot read a game from {type(base).__name__}; give an MctfEnv or a Pyquaticus env, or register a GameReader "
         "for yours (steerclear.shield.wrappers.game_reader), or wrap a function: Shield(...).wrap(f, read=...), where "
         "read turns what f sees into a Fleet"
     )
+
+
+def check_members(reader: Any) -> None:
+    """Refuse a reader without a member of `GameReader`, or with one of another kind.
+
+    Raises:
+        ConfigError: see above.
+    """
+    who = f"the reader {type(reader).__name__}"
+    missing = sorted(name for name in _MEMBERS if not hasattr(reader, name))
+    if missing:
+        raise ConfigError(f"{who} has no {', '.join(missing)}; see GameReader")
+    for name in _MEMBERS[2:]:
+        if not callable(getattr(reader, name)):
+            raise ConfigError(f"{name} of {who} is {getattr(reader, name)!r}; define it as a method, see GameReader")
+    if not isinstance(reader.takes_pairs_only, bool):
+        raise ConfigError(f"takes_pairs_only of {who} is {reader.takes_pairs_only!r}; give True or False")
+    ids: Any = reader.agent_ids
+    listed = isinstance(ids, tuple | list) and all(isinstance(agent, str) for agent in ids)
+    if not listed or not ids or len(set(ids)) < len(ids):
+        raise ConfigError(f"agent_ids of {who} is {ids!r}; give the names of all boats, each once, as a tuple")

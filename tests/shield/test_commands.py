@@ -97,6 +97,19 @@ def seen(**changes):
     return Fleet.of(**{**good, **headings, **changes})
 
 
+AT = [[0.0, 0.0], [30.0, 9.0]]
+FAR = [[0.0, 500.0], [30.0, 9.0]]
+
+
+def paused(*, resets=False, places=(AT, FAR), **shield):
+    """A shield that sees its boat here, then there."""
+    shield = Shield(**shield)
+    for place in places:
+        shield.decide(seen(position_m=place), Commands.relative_deg([[1.0, 0.0], [1.0, 0.0]]))
+        if resets:
+            shield.reset()
+
+
 @pytest.mark.parametrize(
     ("make", "words"),
     [
@@ -108,6 +121,22 @@ def seen(**changes):
         (
             lambda: Shield().decide(seen(), Commands.absolute_rad([[math.pi, 1.0], [1.0, 0.0]])),
             r"3.14159 m/s is requested of boat 'boat_0', whose .* does 0 to 2 m/s.* Rows are \(speed m/s, heading\)",
+        ),
+        (
+            lambda: Shield().decide(seen(), Commands.absolute_deg([[0.0, 2.0], [180.0, 2.0]])),
+            r"180 m/s is given for boat 'boat_1'; rows are \(speed m/s, heading\), in this order",
+        ),
+        (
+            lambda: Shield().decide(seen(), Commands.relative_deg([[0.0, 2.0], [-90.0, 2.0]])),
+            "-90 m/s is given for boat 'boat_1'; rows are",
+        ),
+        (
+            lambda: seen(team=[1, 2]),
+            r"no boat is controlled: .* teams here are \[1, 2\]; give team 0 to the own boats, or controlled=",
+        ),
+        (
+            lambda: paused(),
+            r"boat 'boat_0' is more than 25 m from where it was a decision ago, 0\.1 s; call reset\(\) after a pause",
         ),
     ],
 )
@@ -130,4 +159,11 @@ def test_what_is_right_needs_no_word(caplog, monkeypatch):
         Commands.absolute_deg([[1.0, 350.0], [1.0, -90.0]])
         Commands.absolute_rad([[1.0, math.nan], [1.0, math.inf]])
         Shield().decide(seen(), Commands.game_deg([[9.0, 90.0], [1.0, 0.0]]))
+        Shield().decide(seen(), Commands.absolute_deg([[1.0, 90.0], [math.nan, 0.0]]))
+        seen(team=[1, 2], controlled=[False, False])
+        Fleet.of(position_m=np.zeros((0, 2)), heading_deg=[], speed_mps=[], team=[], platforms=[])
+        paused(resets=True)
+        paused(places=(FAR, FAR))
+        paused(places=(AT, [[20.0, 0.0], [30.0, 500.0]]))  # another's boat may turn up elsewhere
+        paused(places=(AT, [[60.0, 0.0], [30.0, 9.0]]), dt_s=1.0)
     assert caplog.messages == []

@@ -263,7 +263,7 @@ def test_unknown_names_and_gains_of_another_filter_are_refused():
         textbook("velocity_cbf", state, gains=(1.0, 2.0, 3.0))
 
 
-def test_a_barrier_of_ones_own_is_a_filter_and_one_without_a_number_lets_nothing_through(monkeypatch):
+def test_a_barrier_of_ones_own_is_a_filter_and_one_without_a_number_lets_nothing_through(monkeypatch, caplog):
     """The same row as the distance's, by another function: h = 3 (|p|^2 - R^2)."""
 
     def tripled(p, v, radius_m):
@@ -283,6 +283,8 @@ def test_a_barrier_of_ones_own_is_a_filter_and_one_without_a_number_lets_nothing
     guard = textbook("broken", state)
     assert guard.decide(state, ahead(state), ours[:1])[0, 0, 0] == 0.0
     assert guard.reason[0, 0] == 3
+    (message,) = caplog.messages
+    assert "broken returned what is no number (h or a gradient) for p = (0.5, 3) m, and boats stop there" in message
 
 
 @pytest.mark.parametrize("family", ["head_on", "crossing_left"])

@@ -148,6 +148,10 @@ BUILT = {
         r"tuned\['heron'\] is .*2 gains",
     ),
     "tuned no dict": (lambda: Barrier(pair, ((0.5,),), ((0.5,),)), "tuned is .*; give gains by platform"),
+    "tuned for nobody": (
+        lambda: Barrier(pair, {"heronn": (0.5,)}, ((0.5,),)),
+        r"tuned\['heronn'\]: unknown platform 'heronn'; did you mean heron",
+    ),
     "words": (lambda: Barrier(pair, {}, (("fast",),)), r"one of tried is \('fast',\); give numbers"),
     "not finite": (lambda: Barrier(pair, {}, ((float("nan"),),)), "one of tried is .*; give numbers"),
 }

@@ -101,7 +101,9 @@ def test_a_filter_without_a_reason_is_refused():
 
 def test_a_filter_that_sends_no_number_is_refused():
     scenes = short(draw("head_on", "heron", "heron", USUAL, 1, 0, 2))
-    with pytest.raises(FleetError, match="boat 0 of game 0 is not finite"):
+    with pytest.raises(
+        FleetError, match=r"boat 0 of game 0 is not finite: .*; let decide return a speed, m/s, and a turn"
+    ):
         play(scenes, Recording(2, 2, turn_deg=math.nan), USUAL)
 
 

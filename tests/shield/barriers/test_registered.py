@@ -12,6 +12,7 @@ import sys
 
 import numpy as np
 import pytest
+from numba import njit
 from shield_loops import sail
 from steerclear.experiments.conformance import NotConforming, check_barrier
 from steerclear.experiments.entries.wrap import game_spec
@@ -110,6 +111,10 @@ def test_a_function_without_values_is_a_barrier_too():
         ({"margin": lambda x, y, ahead: y, "values": (1.0,)}, "has values that no function takes"),
         ({"values": (1.0,)}, "Barrier was called without margin; it takes name, margin, slope, values"),
         ({"margin": ferrys, "value": (1.0,)}, "Barrier has no value=; did you mean values=?"),
+        ({"margin": ferrys}, "ferrys of barrier 'mine' reads values, and there are none; give values="),
+        ({"margin": lambda x, y, ahead, radius: y - radius[0]}, "<lambda> of barrier 'mine' reads values, and there"),
+        ({"margin": njit(ferrys)}, "ferrys of barrier 'mine' reads values, and there are none"),
+        ({"margin": lambda x, y, ahead: y, "slope": lambda x, y, ahead, of: (0.0, of[0])}, "reads values, and there"),
     ],
 )
 def test_a_barrier_that_cannot_be_asked_is_refused_with_the_remedy(given, words):
@@ -161,7 +166,7 @@ def beyond_its_values(x, y, ahead, values):
 
 @pytest.mark.parametrize("margin", [wrong_value, raises, beyond_its_values])
 def test_where_a_barrier_gives_no_margin_the_boat_stops_and_the_log_says_so(margin, caplog):
-    register_barrier(Barrier("chart", margin))
+    register_barrier(Barrier("chart", margin, values=(1.0,)))
     with caplog.at_level(logging.WARNING):
         decision = Shield(barriers=("chart",)).decide(lone(y_m=4.0), Commands.relative_deg([[1.5, 0.0]]))[0]
     assert (decision.reason, decision.filtered_speed_mps) == (Reason.HELD, 0.0)
@@ -205,7 +210,7 @@ def test_names_are_checked_when_a_shield_is_built():
     assert ShieldConfig(barriers="").barriers == ()
     assert hash(ShieldConfig(barriers="a")) == hash(ShieldConfig(barriers=("a",)))
     with pytest.raises(ConfigError, match="another's"):
-        register_barrier(Barrier("a", ferrys))
+        register_barrier(Barrier("a", lambda x, y, ahead: y))
     with pytest.raises(ConfigError, match="is no barrier"):
         register_barrier(3)
 
