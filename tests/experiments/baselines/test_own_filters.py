@@ -1,5 +1,6 @@
 """Filters and barriers of a user's own that are not what is asked for: one clear error, never Python's."""
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -80,6 +81,14 @@ def test_a_class_that_takes_a_makers_arguments_is_a_maker():
     played = play(scenes, Passing, Conditions())
     assert (played.filtered == played.nominal).all()
     assert measured(Passing).summary["changed_percent"] == 0.0
+
+
+def test_the_filter_on_the_page_is_one():
+    page = (Path(__file__).parents[3] / "docs" / "extend.md").read_text(encoding="utf-8")
+    program, found = page.partition("```python\nclass Slow:")[2].partition("```")[0], {"np": np}
+    exec(f"class Slow:{program}", found)
+    assert measured(found["Slow"]).summary["changed_percent"] == 100.0
+    assert measured("none").summary["changed_percent"] == 0.0
 
 
 def test_an_error_of_a_makers_own_stays_its_own():
