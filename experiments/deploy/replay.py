@@ -187,6 +187,10 @@ def _chain_lines(replay: Replay) -> Iterator[RenderableType]:
     if chain.broken == 1 and chain.unkeyed:
         yield Text(f"Hash chain: {chain.breaks[0]}.", style="yellow")
         return
+    if chain.of_another_key:
+        text = "none of its codes is of this key: another key, or another writer; the chain itself holds"
+        yield Text(f"Hash chain: {text}.", style="red")
+        return
     if chain.broken:
         yield Text("Hash chain: damaged. The log is not as it was written:", style="red")
         yield from (Text(f"  {text}") for text in chain.breaks[:MOST_ROWS])

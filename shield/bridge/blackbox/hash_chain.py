@@ -129,13 +129,14 @@ class ChainCheck:
         keyed: whether its links carry codes.
         unkeyed: whether they do not, though a key was given.
         codes_checked: how many codes were found right.
+        codes_wrong: how many are not of this key; part of ``broken``.
         breaks: what does not fit, in words, `MOST_BREAKS` at most.
         broken: how many things do not fit.
     """
 
     def __init__(self, key: bytes | None = None) -> None:
         self.keyed = self.unkeyed = False
-        self.codes_checked = self.broken = 0
+        self.codes_checked = self.codes_wrong = self.broken = 0
         self.breaks: list[str] = []
         self._key, self._end, self._early = key, "", 0
         self._chain: Chain | None = None
@@ -149,6 +150,11 @@ class ChainCheck:
     def holds(self) -> bool:
         """Whether there is a chain and nothing contradicts it."""
         return self.chained and self.broken == 0
+
+    @property
+    def of_another_key(self) -> bool:
+        """Whether no code is of the key, and nothing else is wrong."""
+        return self.codes_checked == 0 < self.codes_wrong == self.broken
 
     def begin(self, head: ChainHead) -> None:
         """The header of the file was met, with this head in it."""
@@ -205,6 +211,7 @@ class ChainCheck:
             if hmac.compare_digest(found.code, ours.code):
                 self.codes_checked += 1
             else:
+                self.codes_wrong += 1
                 self._tell(f"the code of the link after record {found.count} is not of this key")
 
     def _tell(self, text: str) -> None:

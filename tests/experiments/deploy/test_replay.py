@@ -487,7 +487,11 @@ def test_codes_are_checked_with_the_key_and_another_program_is_named(tmp_path, t
     for options, wanted, words in (
         ((), 0, ("codes were not checked: give --key", program)),
         (("--key", tmp_path / "boats.key"), 0, ("codes are of this key",)),
-        (("--key", tmp_path / "other.key"), 3, ("is not of this key",)),
+        (
+            ("--key", tmp_path / "other.key"),
+            3,
+            ("none of its codes is of this key: another key", "the chain itself holds"),
+        ),
         (("--key", tmp_path / "none.key"), 2, ()),
     ):
         code, said = run(path, *options)
