@@ -150,7 +150,8 @@ class Failsafe:
         if reading.faults.get("second_commander"):
             self._rivals_s[boat] = self._seen.now_s
         if self._seen.now_s - self._rivals_s.get(boat, -math.inf) <= RIVAL_S:
-            self._due("commander", boat, f"{boat}: somebody else commands it too", (boat,))
+            who = f" ({reading.commander.replace('(', '').replace(')', '')})" if reading.commander else ""
+            self._due("commander", boat, f"{boat}: somebody else commands it too{who}; end that program", (boat,))
         off_s = self._seen.outside_model_s.get(boat, 0.0)
         if off_s >= after["model.off"]:
             text = f"{boat} is more than {limits.model.outside_m:g} m from where its platform says, for {off_s:.0f} s"

@@ -20,6 +20,7 @@ from ..platforms.limits import cruise
 from .autopilot_parameters import HOLD, STANDARD_TIMEOUT_S, parameter_faults, sails_by_itself
 from .clock import Clock
 from .fleet_file import FleetFile
+from .mavlink.connection import GROUND_SYSTEM
 from .mavlink.fence import FenceZone
 from .mavlink.telemetry import ENOUGH_FIX
 from .mavlink.vehicle import LinkHealth
@@ -205,16 +206,24 @@ def check_autopilot(watched: Watched) -> Found:
 
 
 def check_commanders(watched: Watched) -> Found:
-    """Nobody else was seen to command the boat or to be ready to, and packets are signed where the file says so."""
+    """Nobody else was seen to command the boat, and packets are signed where the file says so.
+
+    Another ground station may listen, under another id than ours, whose commands the autopilot would obey.
+    """
     health = watched.health
-    who = ", ".join(f"system {system} component {component}" for system, component in sorted(health.stations))
+    who, alike = (
+        ", ".join(f"system {system} component {component}" for system, component in sorted(stations))
+        for stations in (health.stations, [place for place in health.stations if place[0] == GROUND_SYSTEM])
+    )
     refused = [f"{health.faults[k]} {k}" for k in ("bad_signature", "second_sender") if health.faults.get(k)]
     ago_s = watched.now_s - health.other_commander_s
+    others = f"nobody else; another ground station listens ({who})" if who else "nobody else"
+    commander = f" ({health.commander.replace('(', '').replace(')', '')})" if health.commander else ""
     return found(
-        "nobody else; packets signed" if health.signs else "nobody else; not signed",
+        f"{others}; {'packets signed' if health.signs else 'not signed'}",
         {"other_stations": float(len(health.stations)), "unsigned": float(health.faults.get("unsigned", 0))},
-        (math.isfinite(ago_s), f"somebody else commanded it {ago_s:.0f} s ago; end that program"),
-        (who, f"another ground station is on the link ({who}); end it, or accept this check if it only listens"),
+        (math.isfinite(ago_s), f"somebody else{commander} commanded it {ago_s:.0f} s ago; end that program"),
+        (alike, f"another ground station has our id ({alike}): give it another id than {GROUND_SYSTEM}"),
         (
             refused,
             f"refused {', '.join(refused)}: somebody sends in this boat's name; find them before you start",

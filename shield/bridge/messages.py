@@ -52,6 +52,7 @@ class BoatReading:
     released_by: str = ""  # who took it: `PILOT`, `FAILSAFE` (the autopilot said so itself), or empty
     failsafe_over: bool = False  # whether the autopilot said that what made it fail safe is over
     heartbeat_age_s: float = NEVER_S
+    commander: str = ""  # who else was last seen commanding it, in words; empty: nobody
     texts: tuple[str, ...] = ()  # what the autopilot said since the last reading
     # what the link refused since the last reading (bad signature, bad checksum, impossible value), by kind
     faults: dict[str, int] = field(default_factory=dict)

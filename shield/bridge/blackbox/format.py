@@ -134,7 +134,7 @@ COLUMNS: dict[str, tuple[type, str, type, tuple[int, ...]]] = {
 """Values of a `BoatRecord` that are a row of an array: whose, its name there, its kind and shape."""
 NOBODY_NEAR_M = 1e6
 """Margin in logs of 0.9.0 and before where nobody can come near; it is infinite."""
-_LATER = {"released", "released_by", "failsafe_over"}  # parts of a reading that 0.8.0 did not know
+_LATER = {"released", "released_by", "failsafe_over", "commander"}  # parts of a reading that older versions lack
 _READING = {entry.name for entry in dataclasses.fields(BoatReading)} - _LATER
 
 

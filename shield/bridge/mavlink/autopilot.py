@@ -97,6 +97,7 @@ class Autopilot:
         others: system ids of other vehicles heard on the wire.
         stations: other ground stations heard, as (system, component).
         commanded_s: when somebody else was last seen commanding, s; -inf: never.
+        commander: who that was, and what it did, in words; empty: nobody.
         trips_s: round trips of the last TIMESYNC answers, s, newest last.
         expects_guided: whether leaving GUIDED or being disarmed is somebody else's doing.
         released: what took it from us, such as a mode; empty: it is ours. Only `vehicle.prepare` takes it back.
@@ -126,7 +127,7 @@ class Autopilot:
         self.failsafe, self.failsafe_over = "", False
         self.others: set[int] = set()
         self.stations: set[tuple[int, int]] = set()
-        self.commanded_s = -math.inf
+        self.commanded_s, self.commander = -math.inf, ""
         self.trips_s: deque[float] = deque(maxlen=50)
         self._failed_s = self._released_s = self._recheck_s = self._synced_s = -math.inf
         self._open: dict[int, float] = {}
@@ -314,8 +315,8 @@ class Autopilot:
         self._note("parameter_changed", f"{self.boat}: somebody set WP_SPEED to {top:g} m/s; {text}", now_s)
 
     def _tell_commander(self, source: tuple[int, int], now_s: float, what: str) -> None:
-        self.commanded_s = now_s
-        text = f"a second commander {_who(source)} {what}: end it, two commanders undo each other's safety"
+        self.commanded_s, self.commander = now_s, f"{_who(source)} {what}"
+        text = f"a second commander {self.commander}: end it, two commanders undo each other's safety"
         self._say("second_commander", what, source, now_s, text)
 
     def _say(self, fault: str, what: str, source: tuple[int, int], now_s: float, text: str) -> None:

@@ -55,6 +55,7 @@ class LinkHealth:
     stations: frozenset[tuple[int, int]]  # other ground stations heard, as (system, component)
     other_commander_s: float  # when somebody else was last seen commanding the boat, s; -inf: never
     faults: Mapping[str, int]  # of the whole wire since it was opened, by kind
+    commander: str = ""  # who that was, in words; empty: nobody
     fix_fault: str = ""  # why its positions are not believed for want of a fix, in words; empty: they may be
     # zones of the autopilot's own fence; None: not heard, or not asked for because the fence is off
     fence: tuple[FenceZone, ...] | None = None
@@ -181,6 +182,7 @@ class MavlinkLink(Link):
                 released_by=boat.released_by,
                 failsafe_over=boat.failsafe_over,
                 heartbeat_age_s=max(0.0, now_s - heard_s),
+                commander=boat.commander,
                 texts=boat.dialogue.take_texts(),
                 faults=boat.take_faults(),
             )
@@ -241,6 +243,7 @@ class MavlinkLink(Link):
                 stations=frozenset(boat.stations),
                 other_commander_s=boat.commanded_s,
                 faults=dict(self.endpoint.faults),
+                commander=boat.commander,
                 fix_fault=seen.fix.fault(now_s)[1],
                 fence=boat.fence.zones,
                 home_deg=boat.fence.home_deg,

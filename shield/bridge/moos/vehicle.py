@@ -138,6 +138,7 @@ class MoosLink(Link):
                 released=bool(hand),  # his also when it is not heard any more: nothing may be sent against him
                 released_by=PILOT if hand else "",
                 heartbeat_age_s=NEVER_S if health.fault else max(0.0, health.echo_age_s) * self.client.warp,
+                commander=self._drivers.other,
                 texts=texts,
                 faults=faults,
             )

@@ -111,6 +111,12 @@ def test_a_good_link_passes_everything_and_is_watched_once_whatever_was_refused_
     assert link.asked == 1
 
 
+def test_a_station_that_only_listens_is_named_and_passes():
+    result = found(check_commanders, stations=frozenset({(252, 190)}))
+    assert result.passed
+    assert "another ground station listens (system 252 component 190)" in result.text
+
+
 def test_a_link_that_breaks_while_watched_fails_its_checks_and_says_so():
     results = run_checks(link_checks({"blue_1": FakeLink(readings(3))}, HERONS, ManualClock(), 1.0))
     assert not any(r.passed for r in results)
@@ -149,8 +155,19 @@ def test_a_link_that_breaks_while_watched_fails_its_checks_and_says_so():
         (check_autopilot, [], {"fix_type": -1}, "does not say whether GPS has a fix"),
         (check_autopilot, [], {"fix_fault": "GPS fix is poor"}, "GPS fix is poor: wait for a good GPS fix"),
         (check_autopilot, [], {"parameters": {}, "version": None}, "WP_SPEED is not known"),
-        (check_commanders, [], {"stations": frozenset({(255, 190)})}, "on the link (system 255 component 190)"),
+        (
+            check_commanders,
+            [],
+            {"stations": frozenset({(252, 190), (255, 190)})},
+            "has our id (system 255 component 190): give it another id than 255",
+        ),
         (check_commanders, [], {"other_commander_s": 97.0}, "somebody else commanded it 3 s ago; end that program"),
+        (
+            check_commanders,
+            [],
+            {"other_commander_s": 97.0, "commander": "(system 252, component 190) sends SET_MODE"},
+            "somebody else (system 252, component 190 sends SET_MODE) commanded it 3 s ago",
+        ),
         (check_commanders, [], {"faults": {"bad_signature": 4}}, "refused 4 bad_signature: somebody sends in this"),
         (check_commanders, [], {"faults": {"second_sender": 1}}, "find them before you start"),
     ],

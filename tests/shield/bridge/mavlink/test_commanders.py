@@ -80,6 +80,7 @@ def test_whoever_steers_our_boat_is_a_second_commander_and_our_own_frames_coming
     assert "blue_1: a second commander (system 252, component 190)" in text
     assert "end it" in text
     assert watch.commanded_s == 5.0
+    assert "(system 252, component 190) sends " in watch.commander
     watch = Watch()
     frame, stranger = watch.ours.encode(message), Codec(*OURS, None)
     said = [watch.hear_frame(frame, now_s) for now_s in (5.0, 5.1, 5.0 + SAY_AGAIN_S)]
