@@ -7,9 +7,11 @@ from functools import partial
 from importlib.util import find_spec
 
 import numpy as np
+from steerclear import policies
+from steerclear.env.core import BatchedMctf
 from steerclear.env.mctf import MctfEnv
 from steerclear.shield import Shield, ShieldConfig
-from steerclear.shield.wrappers import ShieldedParallelEnv
+from steerclear.shield.wrappers import ShieldedParallelEnv, TeamBatch, games_shield
 
 from . import oracle
 from .play.match import play_match
@@ -35,6 +37,14 @@ def compile_masks() -> None:
     """Compile the masks of actions that learners ask for."""
     env = ShieldedParallelEnv(MctfEnv("aamas2024"), Shield(), masks=True)
     env.reset(seed=0)
+
+
+def compile_batch() -> None:
+    """Compile a batch of games against a scripted team, as learners play them."""
+    core = BatchedMctf("aamas2024", n_games=1)
+    batch = TeamBatch(core, policies.make_batch("medium"), shield=games_shield(core, team="blue"))
+    batch.reset()
+    batch.step(np.zeros(batch.learners, dtype=np.int64))
 
 
 def compile_judge() -> None:
@@ -99,6 +109,7 @@ PARTS: dict[str, Callable[[], object]] = {
     "the shield, each boat by itself": lambda: Shield(ShieldConfig(coordination="per_boat")).warm_up(),
     "the game": compile_game,
     "masks of actions": compile_masks,
+    "batches of games": compile_batch,
     "the judge": compile_judge,
     "boats": compile_boats,
     "fits of boats": compile_fit,
