@@ -202,10 +202,7 @@ def read_fleet(orders: Orders) -> tuple[FleetFile, str]:
         game_config(fleet)
     commanded = fleet.commanded(orders.boat)
     if not commanded:
-        nobodys = [b for b in fleet.boats if b.link and b.commanded and b.agent is None and b.team is None]
         why = f"no boat of team {fleet.team} has a link; give one to command it"
-        if nobodys:
-            why = f"{nobodys[0].name} has a link but no agent or team; add team: {fleet.team} to command it"
         raise FleetFileError(f"{orders.fleet_file}: {why}")
     if fleet.signing is not None:
         read_key(fleet.signing.key_file)

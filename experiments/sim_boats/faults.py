@@ -244,6 +244,8 @@ AT_ONCE = {
     "disarm": "",
 }
 """Faults that happen at once, so that they have no duration, and how to end them."""
+ON_LINK = ("commands_lost", "out_of_order", "duplicate", "corrupt", "restart", "mode", "disarm")
+"""Faults of a link and of the autopilot behind it: on a boat without one they do nothing."""
 OFFERED = tuple(mode for mode in Mode if mode not in NOT_OFFERED)
 
 
@@ -286,13 +288,19 @@ def parse_incident(text: str) -> Incident:
 
 
 class Plan:
-    """Planned faults in order of time; `ConfigError` where a boat is not simulated, or a fault has no such option."""
+    """Planned faults in order of time; `ConfigError` where a boat is not simulated, or the fault does nothing to it."""
 
     def __init__(self, incidents: Iterable[Incident], fleet: SimFleet) -> None:
         self._waiting = sorted(incidents, key=lambda incident: incident.at_s)
         self._fleet = fleet
         for incident in self._waiting:
-            fleet.boat(incident.boat)
+            boat = fleet.boat(incident.boat)
+            if incident.kind in ON_LINK and not boat.has_link:
+                shown = ", ".join(kind for kind in KINDS if kind not in ON_LINK)
+                raise ConfigError(
+                    f"boat {incident.boat!r} has no link, and fault {incident.kind!r} is one of links: it would do "
+                    f"nothing; name a boat with a link, or one of {shown}"
+                )
 
     def look(self) -> list[Incident]:
         """Start the faults that are due and return them."""

@@ -8,6 +8,7 @@ move a sender's place ahead of itself for good, and what was refused leaves no t
 from __future__ import annotations
 
 import contextlib
+import errno
 import ipaddress
 import logging
 import math
@@ -389,9 +390,10 @@ def _hearing_socket(listen: str) -> socket.socket:
     except OSError as error:
         if opened is not None:
             opened.close()
+        whose = "another runner? " if error.errno == errno.EADDRINUSE else ""
         raise BridgeError(
-            f"cannot hear the feed at {listen} ({error.strerror or error}); end the program that uses the port, or "
-            "give another address"
+            f"cannot hear the feed at {listen} ({error.strerror or error}); {whose}end the program that uses the port, "
+            "or give another address"
         ) from None
     return opened
 

@@ -118,6 +118,11 @@ def _agents(fleet: FleetFile) -> Iterator[str]:
     for boat in fleet.boats:
         if boat.agent is not None and boat.team is not None:
             yield f"boat {boat.name!r} has an agent, which says its team; leave its team out"
+        if boat.is_steered and boat.agent is None and boat.team is None:
+            yield (
+                f"boat {boat.name!r} has a link and neither agent nor team: nobody here steers it; give it a team, "
+                "or commanded: false where it is only heard"
+            )
 
 
 def _platforms(fleet: FleetFile) -> Iterator[str]:

@@ -139,7 +139,7 @@ class LinkSettings(Section):
 
     kind: Literal["mavlink", "moos"] = Field(description="the kind of link: mavlink or moos")
     address: str = Field(min_length=4, max_length=200, description='give e.g. "udpin:127.0.0.1:14550"')
-    system_id: int = Field(ge=1, le=255, description="give the autopilot's MAVLink system id, 1 to 255")
+    system_id: int = Field(ge=1, le=254, description="give the autopilot's MAVLink system id, 1 to 254: 255 is ours")
     rate_hz: float = Field(20.0, gt=0.0, le=40.0, description="give the telemetry rate, Hz, at most 40")
     route: str = Field("auto", min_length=1, description='give "auto" or the name of a route')
 

@@ -28,7 +28,7 @@ Peer = tuple[Any, ...]
 
 _DATAGRAM, _CHUNK, _WAITING, _DIAL_S = 65_535, 8_192, 2_048, 5.0
 _REMEDIES = {
-    errno.EADDRINUSE: "another program uses that port: end it or give another port",
+    errno.EADDRINUSE: "another program (another runner?) uses that port: end it or give another port",
     errno.EADDRNOTAVAIL: "this machine has no such address: give one it has, such as 127.0.0.1",
     errno.ECONNREFUSED: "nothing listens there: start the boat or correct the port",
     errno.EACCES: "this user may not use it: choose a port above 1023, or be in the device's group",

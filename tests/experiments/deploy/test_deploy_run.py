@@ -374,5 +374,8 @@ def test_without_a_drill_a_step_of_delay_is_assumed_and_a_declared_one_is_kept(f
 def test_a_file_with_nothing_to_command_says_why(fleet_file):
     text = fleet_file.read_text().replace("agent: agent_0\n", "\n").replace("agent: agent_1, ", "")
     fleet_file.write_text(text)
-    with pytest.raises(FleetFileError, match="blue_1 has a link but no agent or team; add team: blue to command it"):
+    with pytest.raises(FleetFileError, match="'blue_1' has a link and neither agent nor team: nobody here steers it"):
+        read_fleet(orders_of(fleet_file))
+    fleet_file.write_text(text.replace("name: blue_1,", "name: blue_1, commanded: false,"))
+    with pytest.raises(FleetFileError, match="no boat of team blue has a link"):
         read_fleet(orders_of(fleet_file))

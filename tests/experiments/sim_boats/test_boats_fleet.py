@@ -3,6 +3,7 @@ import json
 import math
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from boat_links import READY, station
@@ -11,7 +12,7 @@ from steerclear.env.record import load
 from steerclear.experiments.cli import app
 from steerclear.experiments.deploy.demo import demo_file, free_ports
 from steerclear.experiments.sim_boats import RadioSettings, SimBoat, SimFleet
-from steerclear.experiments.sim_boats.faults import AT_ONCE, KINDS, Incident, faults_page, parse_incident
+from steerclear.experiments.sim_boats.faults import AT_ONCE, KINDS, ON_LINK, Incident, Plan, faults_page, parse_incident
 from steerclear.experiments.sim_boats.fleet import boats_of
 from steerclear.shield.bridge.clock import ManualClock
 from steerclear.shield.bridge.fleet_file import parse_fleet
@@ -293,3 +294,17 @@ def test_planned_faults_are_read():
     for wrong in ("jump@60", "b:jump", "b:jump@x", "b:jump@1,a=x y", "b:jump@1.2.3", ""):
         with pytest.raises(ConfigError):
             parse_incident(wrong)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_fault_of_links_is_refused_for_a_boat_without_one(kind):
+    def planned(has_link):
+        fleet = SimpleNamespace(boat=lambda name: SimpleNamespace(has_link=has_link))
+        return Plan([parse_incident(f"red_1:{kind}@5")], fleet)
+
+    assert planned(has_link=True)
+    if kind in ON_LINK:
+        with pytest.raises(ConfigError, match=f"'red_1' has no link, and fault '{kind}' is one of links: it would do"):
+            planned(has_link=False)
+    else:
+        assert planned(has_link=False)

@@ -44,7 +44,8 @@ WRONG = [
     ("agent_1", "agent_0", "two boats play 'agent_0'"),
     ("blue_2", "blue_1", "two boats are named 'blue_1'"),
     ("system_id: 2", "system_id: 1", "have one system_id, 1"),
-    ("system_id: 2", "system_id: 256", "system_id is 256: it should be less than or equal to 255; give"),
+    ("system_id: 2", "system_id: 256", "system_id is 256: it should be less than or equal to 254; give"),
+    ("system_id: 2", "system_id: 255", "give the autopilot's MAVLink system id, 1 to 254: 255 is ours"),
     ("agent_3", "agent_7", "give an even number"),
     ("size_m: [80, 40]", "size_m: [80]", "size_m[1] is missing"),
     ("size_m: [80, 40]", "size_m: [80, -1]", "greater than 0; give [length"),
@@ -156,6 +157,14 @@ def test_boats_of_somebody_else_are_not_commanded():
     fleet = parse_fleet(GOOD.replace("system_id: 2}", "system_id: 2}, commanded: false"))
     assert [boat.name for boat in fleet.commanded()] == ["blue_1"]
     assert fleet.contact_of(fleet.boat("blue_2")) == "feed"
+
+
+def test_a_boat_with_a_link_that_nobody_steers_says_so_or_is_refused():
+    text = fleet_text(blue=2, red=0).replace("name: blue_2, team: blue", "name: blue_2")
+    with pytest.raises(FleetFileError, match="'blue_2' has a link and neither agent nor team: nobody here steers it"):
+        parse_fleet(text)
+    fleet = parse_fleet(text.replace("name: blue_2", "name: blue_2, commanded: false"))
+    assert [boat.name for boat in fleet.ours] == ["blue_1"]
 
 
 def test_a_platform_of_the_file_is_used():
