@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import logging
 import shlex
 import signal
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -45,12 +46,15 @@ from .policy_checks import say_of_elsewhere, say_what_runs
 from .provenance import head_of
 from .result_files import write_json
 from .sim_boats.demo import demo_fleet, demo_text
+from .words import count_text
+from .workers import COMPILES, LOG
 
 DEMO_WAIT_S = 300.0
 """Simulated boats may have to be compiled first."""
 STOPPED = "interrupted; boats were stopped as said above"
 GRAVE = {*SITUATION, "autopilot", "commanders", "fence"}
 """Kinds of checks without which boats are not safe: no line invites to accept them."""
+SIMULATED = " (drill: in simulation only)"
 Fleet = Annotated[Path, typer.Argument(metavar="FLEET.yaml", help="The runner's own file.", show_default=False)]
 WithParent = Annotated[
     bool, o.flag("End when standard input is closed: for programs that start this one.", "--with-parent")
@@ -93,7 +97,9 @@ def preflight(
     orders, started = how.orders(fleet, begun_unix_s=time.time()), time.perf_counter()
     with logging_aside(log_path(load_fleet(fleet).log_dir, ".log", orders.begun_unix_s), shown=True):
         outcome = check_boats(orders, _surface(out(), orders), drill=not no_drill)
-    show_outcome(outcome)
+    show_outcome(outcome, "no boat was moved" if no_drill else "not ready")
+    if no_drill and not outcome.refused and not outcome.ended:
+        say("checks passed; no boat was moved")
     _write(json_file, "preflight", orders, outcome, started)
     if outcome.ended:
         raise Interrupted(STOPPED)
@@ -118,18 +124,19 @@ def show_check(console: Console, result: CheckResult, accepted: Sequence[str] = 
     console.print(f"{result.name}: {result.text}", markup=False, soft_wrap=True)
 
 
-def show_outcome(outcome: Outcome) -> None:
-    """What boats were left doing and where the logs are; why nothing was begun."""
+def show_outcome(outcome: Outcome, so: str = "not started") -> None:
+    """What boats were left doing and where the logs are; which checks do not pass, and what is ``so`` for that."""
     say(*outcome.left)
     if outcome.refused:
         names = [result.name for result in outcome.refused]
         light = [name for name in names if name.partition(":")[0] not in GRAVE]
         grave = [name for name in names if name not in light]
-        say(f"not started: {len(names)} checks do not pass")
+        say(f"{so}: {count_text(len(names), 'check does', 'checks do')} not pass")
         if grave:
             say(f"put right, boats are not safe without: {', '.join(grave)}")
         if light:
-            say(f"put right, or accept: {' '.join(f'--accept {name}' for name in light)}")
+            only = SIMULATED if "drill" in light else ""
+            say(f"put right, or accept: {' '.join(f'--accept {name}' for name in light)}{only}")
     if outcome.log is not None:
         say(outcome.log)
     if outcome.missing:
@@ -225,19 +232,42 @@ def deploy(
 
 def _steer(orders: Orders, file: FleetFile, opponents: str, dashboard: bool) -> Outcome:
     """Run the boats; ``opponents``: first simulate them, against that policy."""
+    notice = CompileNotice()
 
     def sinks(file: FleetFile, operator: Operator, clock: Clock) -> Sequence[TickSink]:
+        notice.close()
         return (Dashboard(file, operator, clock),) if dashboard else (PlainLines(warn),)
 
     console = out()
     with ExitStack() as stack:
         stack.enter_context(logging_aside(log_path(file.log_dir, ".log", orders.begun_unix_s), shown=not dashboard))
+        if dashboard:
+            stack.enter_context(closing(notice)).open()
         if opponents:
             water = stack.enter_context(Demo(orders.fleet_file, opponents, orders.speed))
             with err().status("simulated boats are starting; the first time all is compiled, which takes minutes"):
                 water.wait(DEMO_WAIT_S)
         surface = Surface(lambda result: show_check(console, result, orders.accept), sinks)
         return run_boats(orders, surface, Operator())
+
+
+class CompileNotice(logging.Handler):
+    """Says once on stderr that machine code is compiled: until the dashboard takes the screen nothing else would."""
+
+    def open(self) -> None:
+        """Listen from now on."""
+        LOG.addHandler(self)
+
+    def close(self) -> None:
+        """Say nothing any more; may be called again."""
+        LOG.removeHandler(self)
+        super().close()
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Say it, the first time."""
+        if COMPILES in record.getMessage():
+            warn(record.getMessage())
+            LOG.removeHandler(self)
 
 
 def on_terminal() -> bool:
@@ -291,7 +321,8 @@ def sea_trial(
 
 def next_words(log: Path | None, boat: str) -> str:
     """What to type next, as a shell takes it."""
-    return f"next: {shlex.join(['steerclear', 'fit', str(log), '--boat', boat, '--out', f'{boat}.yaml'])}"
+    typed = shlex.join(["steerclear", "fit", str(log), "--boat", boat, "--out", f"{boat}.yaml"])
+    return f"next: {typed}  # and name it in FLEET.yaml"
 
 
 def _show_trial(trial: SeaTrial) -> None:

@@ -24,7 +24,7 @@ from steerclear.shield.fleet import Fleet
 
 from ..words import count_text
 from .dashboard_map import COLOURS, SYMBOLS, FieldMap
-from .plain import LINES
+from .plain import LINES, effect_words
 
 MOST_ACTIONS = 6  # most active responses shown as text
 LOOK_AHEAD_S = 60.0  # later approaches are not shown, s
@@ -252,7 +252,8 @@ class View:
         for boat in self._fleet.boats:
             name, reading = boat.name, tick.readings.get(boat.name)
             if reading is not None:
-                cells = _own(reading, decisions.get(name), tick, self._near(near.get(name)))
+                oldest_s = self._fleet.limits.navigation.max_age_s
+                cells = _own(reading, decisions.get(name), tick, self._near(near.get(name)), oldest_s)
             else:
                 cells = _other(contacts.get(name), moment.now_s, self._fleet.limits.contact.max_age_s)
             rows.append({"boat": self._name(name, tick.game), **cells})
@@ -312,7 +313,7 @@ def boats_table(width: int, rows: Sequence[Mapping[str, Any]]) -> Table:
 def _lower(moment: Moment, columns: int) -> list[Text]:
     """Return the open menu, or the active responses and the latest log lines; long lines are wrapped."""
     actions = () if moment.tick is None else moment.tick.actions
-    texts = moment.menu or [f"{action.subject}: {action.text}" for action in actions[:MOST_ACTIONS]]
+    texts = moment.menu or [effect_words(action) for action in actions[:MOST_ACTIONS]]
     style = "bold" if moment.menu else "yellow"
     pieces = [piece for text in texts for piece in textwrap.wrap(text, max(20, columns), subsequent_indent="   ")]
     lines = [Text(piece, style, no_wrap=True, overflow="crop") for piece in pieces]
@@ -323,13 +324,14 @@ def _lower(moment: Moment, columns: int) -> list[Text]:
     return lines + [Text(line, "dim", no_wrap=True, overflow="ellipsis") for line in moment.log]
 
 
-def _own(reading: BoatReading, decision: Decision | None, tick: Tick, near: Text) -> dict[str, Any]:
+def _own(reading: BoatReading, decision: Decision | None, tick: Tick, near: Text, limit_s: float) -> dict[str, Any]:
     """Return the cells of an own boat by column title."""
+    is_old = reading.velocity_age_s > limit_s
     sent = tick.sent.get(reading.boat)
     sent_text = Text("-") if sent is None else Text(_command(sent.speed_mps, sent.heading_rad))
     if sent is not None and not sent.delivered:
         sent_text = Text("not sent", "bold red")
-    cells = {**_seen(reading, Text(_age(reading.age_s))), "nominal": "-", "filtered": sent_text, "margin": "-"}
+    cells = {**_seen(reading, Text(_age(reading.age_s)), is_old), "nominal": "-", "filtered": sent_text, "margin": "-"}
     if not reading.ready:
         return {**cells, "why": Text(reading.mode or "not ready", "bold red"), "closest": Text(reading.why_not, "red")}
     if decision is None:
@@ -354,11 +356,12 @@ def _other(contact: Contact | None, now_s: float, limit_s: float) -> dict[str, A
     age_s = now_s - contact.fixed_s
     source = Text(f"by {contact.source}, error {contact.error_m:.1f} m", "dim")
     age = Text(_age(age_s), "bold red" if age_s > limit_s else "")
-    return {**_seen(contact, age), "why": Text("contact", "dim"), "closest": source}
+    return {**_seen(contact, age, age_s > limit_s), "why": Text("contact", "dim"), "closest": source}
 
 
-def _seen(boat: BoatReading | Contact, age: Text) -> dict[str, Any]:
-    speed = f"{boat.speed_mps:.2f}" if math.isfinite(boat.speed_mps) else "-"
+def _seen(boat: BoatReading | Contact, age: Text, is_old: bool) -> dict[str, Any]:
+    """Return the cells of what was seen of a boat; a speed older than its limit says nothing."""
+    speed = "-" if is_old or not math.isfinite(boat.speed_mps) else f"{boat.speed_mps:.2f}"
     return {"hdg": _heading(boat.heading_rad), "m/s": speed, "age": age}
 
 

@@ -130,18 +130,19 @@ class PlainLines:
                 changed = _say("changed", since.changed, since.commands)
                 said = [near, changed, _say("policy", 1e3 * tick.policy_age_s)]
             self._say(f"{_say('time', tick.began_s - began_s)}  {', '.join(said)}")
-            new = {(one.subject, one.condition, one.response): _effect(one) for one in tick.actions}
+            new = {(one.subject, one.condition, one.response): effect_words(one) for one in tick.actions}
             for key, text in new.items():
                 if key not in self._shown or key[1] == "geofence":
                     self._say(_say("effect", text))
             self._shown = set(new)
 
 
-def _effect(action: Action) -> str:
-    """Why a response is in effect, what is done, and how control returns, where the condition alone tells."""
+def effect_words(action: Action) -> str:
+    """Why a response is in effect, of whom, what is done, and how control returns, where the condition alone tells."""
+    named = "" if action.subject in action.text else f"{action.subject}: "
     returns = {row.returns for row in CONDITIONS.values() if row.name.partition(".")[0] == action.condition}
     done = "" if action.response == "none" else f" -> {action.response}"
-    return action.text + done + (f"; control returns: {returns.pop()}" if done and len(returns) == 1 else "")
+    return named + action.text + done + (f"; control returns: {returns.pop()}" if done and len(returns) == 1 else "")
 
 
 def _say(name: str, *values: object) -> str:

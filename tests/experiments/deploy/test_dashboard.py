@@ -118,7 +118,15 @@ def test_what_is_wrong_is_said(stream):
     action = Action("red_2", "contact", "slow", "red_2 not heard for 1.3 s: all boats slow")
     lines = shown(stream.fleet, Moment(dataclasses.replace(tick, actions=(action,)), 5.0))
     assert "1 response in effect" in lines[1]
-    assert any(action.text in line for line in lines)
+    whole = " ".join(line.strip() for line in lines)
+    assert "red_2 not heard for 1.3 s: all boats slow -> slow; control returns: by itself" in whole
+    assert "red_2: red_2" not in whole
+    assert "blue_1: told so -> stop" in " ".join(
+        shown(
+            stream.fleet,
+            Moment(dataclasses.replace(tick, actions=(Action("blue_1", "override", "stop", "told so"),)), 5.0),
+        )
+    )
     unready = BoatReading("blue_2", 5.0, mode="MANUAL", why_not="mode is MANUAL; switch it to GUIDED")
     nothing = {"fleet": None, "decisions": None, "nominal": None, "sent": {}, "contacts": ()}
     lost = dataclasses.replace(tick, readings={**tick.readings, "blue_2": unready}, **nothing)
@@ -127,6 +135,20 @@ def test_what_is_wrong_is_said(stream):
     assert all(words in row_of(lines, "blue_2") for words in ("MANUAL", "never", "mode is MANUAL; switch it"))
     assert "not heard" in row_of(lines, "red_1")
     assert "undecided" in row_of(lines, "blue_1")
+
+
+def test_a_speed_that_is_too_old_is_not_shown(stream):
+    tick = stream.tick(5.0)
+
+    def row(boat, age_s):
+        reading = dataclasses.replace(tick.readings["blue_1"], speed_mps=1.23, velocity_age_s=age_s)
+        contacts = tuple(dataclasses.replace(one, speed_mps=1.23, fixed_s=5.0 - age_s) for one in tick.contacts)
+        aged = dataclasses.replace(tick, readings={**tick.readings, "blue_1": reading}, contacts=contacts)
+        return row_of(shown(stream.fleet, Moment(aged, 5.0), columns=120), boat)
+
+    for boat in ("blue_1", "red_1"):
+        assert "1.23" in row(boat, 0.1)
+        assert "1.23" not in row(boat, 6.0)
 
 
 def test_the_banner_says_the_worst_that_is_so(stream):

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from logged_runs import Encounter, header_of
 from rich.console import Console
-from steerclear.experiments.cli_boats import show_check, show_outcome
+from steerclear.experiments.cli_boats import CompileNotice, show_check, show_outcome
 from steerclear.experiments.deploy.keys import FIGURES, figure_rows
 from steerclear.experiments.deploy.orders import Outcome
 from steerclear.experiments.deploy.plain import PlainLines, Tally
@@ -93,6 +93,27 @@ def test_what_lasts_is_said_once_whatever_its_figures_and_again_when_its_respons
     for line, response, ages in zip(said, ("slow", "stop"), ((1.0, 1.5, 2.0), (5.0, 5.5)), strict=True):
         assert line.split("; ")[0] in {f"red_1 {age} s old -> {response}" for age in ages}
         assert "; control returns: by itself" in line
+
+
+def test_that_machine_code_is_compiled_is_said_until_the_dashboard_takes_the_screen(capsys):
+    log, notice = logging.getLogger("steerclear.shield.jit"), CompileNotice()
+    notice.open()
+    assert notice in log.handlers
+    for text, count in (("nothing of note", 0), ("steerclear compiles its machine code, once: about a minute", 1)):
+        notice.handle(logging.makeLogRecord({"msg": text}))
+        assert capsys.readouterr().err.count("compiles its machine code") == count
+    assert notice not in log.handlers, "it is said once"
+    notice.open()
+    notice.close()
+    assert notice not in log.handlers
+
+
+def test_a_drill_is_offered_to_be_accepted_in_simulation_only(capsys):
+    for name, words in (("drill", True), ("latency:gannet", False)):
+        show_outcome(Outcome(refused=[CheckResult(name, False, "no")]), "not ready")
+        said = capsys.readouterr().out
+        assert "not ready: 1 check does not pass" in said
+        assert ("in simulation only" in said) == words
 
 
 def test_checks_without_which_boats_are_not_safe_are_not_offered_to_be_accepted(capsys):
