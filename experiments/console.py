@@ -183,7 +183,12 @@ class OnceCommand(TyperCommand):
                 joined = ", values joined by commas" if "," in (option.metavar or "") else ""
                 ctx.fail(f"{option.opts[0]} is given twice; give it once{joined}")
         takes_any, ctx.allow_extra_args = ctx.allow_extra_args, True  # to be refused in words of ours
-        extra = list(super().parse_args(ctx, args))
+        typed = list(args)  # what parses takes its words away
+        try:
+            extra = list(super().parse_args(ctx, args))
+        except typer.BadParameter as error:
+            _fail_of_number(ctx, typed, error)
+            raise
         if extra and not takes_any:
             ctx.fail(f"{extra[0]} is one too many; {self._takes()}")
         return extra
@@ -203,6 +208,21 @@ class OnceCommand(TyperCommand):
             if name in takes and (after is None or after in known):
                 found = "nothing follows it" if after is None else f"{after} follows it"
                 ctx.fail(f"{name} has no value ({found}); give {name} {takes[name].metavar}")
+
+
+def _fail_of_number(ctx: Any, args: list[str], error: typer.BadParameter) -> None:
+    """Refuse a value that is no number in words of ours: what was given, and what the option takes, with its unit."""
+    option, kind = error.param, error.message.partition("unable to parse string as ")[2]
+    if not kind or not isinstance(option, TyperOption):
+        return
+    found = [
+        (word.partition("=")[0], word.partition("=")[2] if "=" in word else after)
+        for word, after in zip(args, [*args[1:], ""], strict=False)
+        if word.partition("=")[0] in option.opts
+    ]
+    name, value = found[0] if found else (option.opts[0], "what was given")
+    whole = "whole " if "integer" in kind else ""
+    ctx.fail(f"{name} is {value!r}, no {whole}number; give {name} {option.metavar}: {option.help}")
 
 
 class App(typer.Typer):

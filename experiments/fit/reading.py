@@ -84,7 +84,9 @@ def read_logs(
         if path.suffix.lower() not in readers:
             raise FitError(f"{path.name} is no log that can be read; give {', '.join(readers)}")
         if not path.is_file():
-            raise FitError(f"there is no log {path}")
+            raise FitError(
+                f"there is no log {path}; give the path of one that sea-trial or deploy wrote, or a log of a boat"
+            )
         runs += readers[path.suffix.lower()](path, notice)
     pieces = [run.part(a, b) for run in runs for a, b in run.bounds(LONGEST_RUN_S)]
     _check_enough(runs, len(pieces))

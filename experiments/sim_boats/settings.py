@@ -17,7 +17,7 @@ def check_bounds(settings: object, **bounds: tuple[float, float]) -> None:
     for name, (low, high) in bounds.items():
         value = getattr(settings, name)
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
-            raise ConfigError(f"{name} is {value!r}; give a number within {low:g} and {high:g}")
+            raise ConfigError(f"{name} is {value!r}; give a number, {low:g} to {high:g}")
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 MOOS = "moos://"
 LEAST_MOOS_HZ = 5.0
+UNITS = {"_per_s": "1/s", "_mps": "m/s", "_rad": "rad", "_m": "m", "_s": "s"}
+"""Units of settings by the ends of their names."""
 
 
 def check_fleet(fleet: FleetFile) -> None:
@@ -85,13 +87,20 @@ def shield_config(fleet: FleetSettings) -> ShieldConfig:
     try:
         config = ShieldConfig.of(**settings)
     except (ConfigError, TypeError) as error:
-        raise FleetFileError(f"shield: {error}") from None
+        raise FleetFileError(f"shield: {error}{_unit_words(str(error))}") from None
     if config.max_track_age_s < oldest:
         raise FleetFileError(
             f"shield.max_track_age_s is {config.max_track_age_s} s and boats are kept for {oldest} s "
             "(limits.*.lost_after_s); leave shield.max_track_age_s out"
         )
     return config
+
+
+def _unit_words(said: str) -> str:
+    """The unit of a setting that is no number, as its name ends."""
+    name = said.partition(" ")[0]
+    unit = next((unit for end, unit in UNITS.items() if name.endswith(end)), "")
+    return f" in {unit}, without the unit" if unit and said.endswith("give a number") else ""
 
 
 def address_of(text: str, key: str) -> tuple[str, int]:

@@ -190,7 +190,8 @@ def parse_fleet(text: str, where: str = "FLEET.yaml", folder: Path | None = None
     except FleetFileError as error:
         raise FleetFileError(f"{where} is not YAML of a fleet file: {error}") from None
     if not isinstance(content, dict):
-        raise FleetFileError(f"{where} holds no settings; give version, field, geofence, team and boats")
+        what = "a list in place of settings" if isinstance(content, list) else "no settings"
+        raise FleetFileError(f"{where} holds {what}; give version, field, geofence, team and boats")
     if "max_speed_mps" in content:
         raise FleetFileError(f"{where} is a platform file, of one boat; give a FLEET.yaml whose boats name it")
     version = content.get("version")
@@ -232,6 +233,10 @@ def load_with_text(path: str | Path) -> tuple[FleetFile, str]:
                 raise OSError(errno.EINVAL, "it is no plain file")
             text = file.read(MOST_BYTES + 1).decode("utf-8")  # no more of it than a fleet file may hold
         folder = Path(path).resolve().parent
+    except UnicodeDecodeError:
+        raise FleetFileError(
+            f"cannot read {path} (it is no UTF-8; UTF-16?); save it as UTF-8, or give a FLEET.yaml"
+        ) from None
     except (OSError, ValueError) as error:  # a path may hold what no path can
         why = getattr(error, "strerror", None) or error
         raise FleetFileError(f"cannot read {path} ({why}); give the path of a FLEET.yaml") from None

@@ -346,6 +346,16 @@ class FleetSettings(Section):
     log_dir: Path = Field(Path("logs"), description="give the folder of the logs")
 
 
+_TOLD = {
+    r"^\w+ should have at least (\d+) items? after validation, not (\d+)$": r"it has \2 entries, fewer than \1",
+    r"^\w+ should have at most (\d+) items? after validation, not (more|\d+).*$": r"it has more than \1 entries",
+    "should be an object$": "should be a mapping (key: value), no list or text",
+    "should be a valid array$": "should be a list ([..., ...])",
+    "should be a valid number$": "should be a number alone, without a unit or quotes",
+}
+"""What the checks of values say, and words for it that a person who writes YAML knows."""
+
+
 def explain(error: ValidationError, root: type[BaseModel]) -> str:
     """The first fault with where it is and the remedy, and how many more there are, in one line."""
     faults = error.errors(include_url=False)
@@ -370,6 +380,8 @@ def explain(error: ValidationError, root: type[BaseModel]) -> str:
 
 
 def _said(message: str) -> str:
+    for told, words in _TOLD.items():
+        message = re.sub(told, words, message)
     return re.sub("^(Input|String|List|Tuple|Dictionary|Value)(?= should)", "it", message)
 
 

@@ -180,6 +180,10 @@ def _geojson_lines(path: Path, key: str) -> list[tuple[int, bool, Line]]:
         if path.stat().st_size > MOST_BYTES:
             raise FleetFileError(f"{key}: {path} is larger than {MOST_BYTES >> 20} MiB; cut it to the water you use")
         content = json.loads(path.read_text(encoding="utf-8-sig"))
+    except json.JSONDecodeError as error:
+        raise FleetFileError(f"{key}: {path} is no GeoJSON: no JSON ({error}); give one of polygons or lines") from None
+    except UnicodeDecodeError:
+        raise FleetFileError(f"{key}: {path} is no UTF-8 (UTF-16?); save it as UTF-8") from None
     except (OSError, ValueError, RecursionError) as error:
         why = getattr(error, "strerror", None) or error
         raise FleetFileError(f"{key}: cannot read {path} ({why}); give the path of a GeoJSON file") from None
@@ -197,6 +201,8 @@ def _parts(node: Any) -> Iterator[tuple[bool, Sequence[Sequence[Sequence[float]]
 
     Points bound nothing and are left out.
     """
+    if not isinstance(node, dict) or "type" not in node:
+        raise ValueError("an object has no type, such as FeatureCollection")
     kind = node["type"]
     if kind in ("FeatureCollection", "GeometryCollection"):
         for part in node["features" if kind == "FeatureCollection" else "geometries"]:

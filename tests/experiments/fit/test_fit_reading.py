@@ -70,7 +70,7 @@ BAD = {
         r"tells no headings commanded \(NTUN.DesYaw\)",
     ),
     "no MAVLink": ("a.tlog", lambda p: p.write_bytes(b"nothing of the kind" * 50), "tells no positions|cannot be read"),
-    "no log there": ("b.csv", lambda p: None, "there is no log"),
+    "no log there": ("b.csv", lambda p: None, "there is no log .*; give the path of one"),
 }
 
 

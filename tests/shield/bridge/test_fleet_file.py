@@ -125,7 +125,41 @@ def test_what_is_wrong_is_said_in_one_line_with_the_remedy(old, new, said):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("text", ["", "[]", "a: [", "just words", "a: *b", "\x00", "!!python/object:os.system {}"])
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (
+            "team: blue",
+            "team: blue\nobstacles: [{polygon_m: [[0, 0], [1, 1]]}]",
+            "it has 2 entries, fewer than 3; give",
+        ),
+        ("xmax_m: 100", "xmax_m: 100 m", "'100 m': it should be a number alone, without a unit or quotes; give metres"),
+        (
+            "team: blue",
+            "team: blue\nlimits: [1]",
+            "limits is [1]: it should be a mapping (key: value), no list or text",
+        ),
+        ("size_m: [80, 40]", "size_m: 80", "it should be a list ([..., ...]); give [length along x"),
+        ("team: blue", "team: blue\nshield: {current_mps: 1 kn}", "give a number in m/s, without the unit"),
+    ],
+)
+def test_values_of_another_kind_are_told_in_words_of_the_file(old, new, said):
+    with pytest.raises(FleetFileError) as caught:
+        parse_fleet(GOOD.replace(old, new))
+    assert said in str(caught.value)
+    assert "validation" not in str(caught.value)
+
+
+def test_a_list_and_a_file_that_is_not_utf_8_are_named(tmp_path):
+    with pytest.raises(FleetFileError, match="holds a list in place of settings; give version"):
+        parse_fleet("- version: 1\n")
+    path = tmp_path / "FLEET.yaml"
+    path.write_text(GOOD, encoding="utf-16")
+    with pytest.raises(FleetFileError, match=r"cannot read .* \(it is no UTF-8; UTF-16\?\); save it as UTF-8"):
+        load_fleet(path)
+
+
+@pytest.mark.parametrize("text", ["", "a: [", "just words", "a: *b", "\x00", "!!python/object:os.system {}"])
 def test_what_is_no_settings_is_said(text):
     with pytest.raises(FleetFileError, match=r"no settings|not YAML"):
         parse_fleet(text)

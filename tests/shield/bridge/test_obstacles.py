@@ -132,8 +132,9 @@ def test_land_with_a_hole_leaves_the_hole_and_a_closed_line_has_no_inside(tmp_pa
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ("{", "cannot read"),
-        ("[]", "is no GeoJSON"),
+        ("{", r"is no GeoJSON: no JSON \(.*; give one of polygons or lines"),
+        ("[]", r"is no GeoJSON \(an object has no type, such as FeatureCollection\)"),
+        ('{"a": 1}', r"is no GeoJSON \(an object has no type"),
         ('{"type": "Circle"}', "unknown type 'Circle'"),
         ('{"type": "Point", "coordinates": [0, 0]}', "holds no polygon or line"),
         ('{"type": "LineString", "coordinates": [[42.0, -710.0], [1, 2]]}', r"not \[longitude, latitude\]"),
