@@ -7,6 +7,7 @@ Run them over your own in a test: ``check_policy("mine")``, ``check_platform("mi
 from __future__ import annotations
 
 import math
+import random
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -105,6 +106,12 @@ def check_reader(make_env: Callable[[], Any]) -> None:
         raise ConfigError(f"make_env is {type(make_env).__name__}; give a function that builds the env: lambda: env")
     games = [_Played(make_env()) for _ in range(3)]
     plain, passed, steered = games
+    begun = [game.motion.fleets[0].state for game in (plain, passed)]
+    _hold(
+        np.array_equal(*begun, equal_nan=True),
+        "the game begins otherwise each time it is reset with the same seed; give an env whose starts follow the seed, "
+        "or are fixed",
+    )
     steps = min(MOST_STEPS, max(STEPS, round(PLAYED_S / plain.step_s)))
     for step in range(steps):
         if not all(game.goes_on() for game in games):
@@ -129,6 +136,19 @@ def check_reader(make_env: Callable[[], Any]) -> None:
         plain.reader.surroundings(team, True)
 
 
+@contextmanager
+def _global_generators(seed: int) -> Iterator[None]:
+    """Seed the generators of the whole process, from which Pyquaticus draws its starts, and put them back after."""
+    before = random.getstate(), np.random.get_state()  # noqa: NPY002 - theirs
+    random.seed(seed)
+    np.random.seed(seed)  # noqa: NPY002
+    try:
+        yield
+    finally:
+        random.setstate(before[0])
+        np.random.set_state(before[1])  # noqa: NPY002
+
+
 class _Played:
     """A game that `check_reader` plays, and what its reader says of it."""
 
@@ -139,7 +159,8 @@ class _Played:
         self.step_s = facts.moves * facts.dt_s
         self.held = max(1, round(HELD_S / self.step_s))
         self.motion, self.given = Motion(self.step_s, facts.moves), list[Array]()
-        env.reset(seed=5)
+        with _global_generators(5):
+            env.reset(seed=5)
         self.moments = {self.reader.moment()}
         self._see()
 

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from steerclear import policies
+from steerclear.env.config import GameConfig
 from steerclear.env.mctf import MctfEnv
 from steerclear.experiments.conformance import (
     NotConforming,
@@ -203,6 +204,25 @@ def test_a_reader_without_a_part_is_told_which(apart):
 def test_an_area_of_another_form_is_refused(area_m):
     with pytest.raises(ConfigError, match=r"give \(xmin, ymin, xmax, ymax\), m"):
         check_barrier("none", area_m)
+
+
+class Drawn(MctfEnv):
+    """Begins where a generator of the process says, as Pyquaticus does, or one that no seed sets."""
+
+    draw = staticmethod(np.random.random)
+
+    def reset(self, seed=None, options=None):
+        return super().reset(seed=int(1e6 * self.draw()), options=options)
+
+
+def test_starts_may_be_drawn_by_the_generator_of_the_process_but_not_by_one_without_seed():
+    game = GameConfig.preset("aamas2024", default_start=False)
+    before = np.random.get_state()[1].copy()  # noqa: NPY002 - as Pyquaticus draws
+    check_reader(lambda: Drawn(game))
+    assert np.array_equal(np.random.get_state()[1], before)  # noqa: NPY002
+    unseeded = type("Unseeded", (Drawn,), {"draw": staticmethod(np.random.default_rng().random)})
+    with pytest.raises(NotConforming, match="begins otherwise each time"):
+        check_reader(lambda: unseeded(game))
 
 
 def test_what_nobody_reads_is_refused():

@@ -24,7 +24,7 @@ NEAR_M = (4.0, 2.5)
 COUNTED = [f"{who}, {near_m:g} m" for near_m in NEAR_M for who in ("commanded", "game-controlled")]
 
 
-def new_game(seed):
+def new_game():
     """The environment of the branch that is installed, three boats a team, drawn starts, a move of 0.1 s a decision."""
     try:
         config, name = importlib.import_module("pyquaticus.mctf26_config"), "competition_pyquaticus:CompPyquaticusEnv"
@@ -35,22 +35,26 @@ def new_game(seed):
     settings = copy.deepcopy(config.config_dict_std)
     settings |= {"default_init": False, "sim_speedup_factor": 1, "max_time": TIME_S}
     size = {} if name == "CompPyquaticusEnv" else {"team_size": 3}
-    env = make(action_space="continuous", config_dict=settings, **size)
-    return env, env.reset(seed=seed)
+    return make(action_space="continuous", config_dict=settings, **size)
+
+
+def begun(env, seed):
+    """Observations and infos of a start that the seed alone says: starts and policies draw from these generators."""
+    random.seed(seed)
+    np.random.seed(seed)  # noqa: NPY002
+    return env.reset(seed=seed)
 
 
 def entries_in(seed, opponent, shielded):
     """(5,): entries of our boats, commanded and game-controlled, at each distance; our captures less theirs."""
     agent = importlib.import_module("pyquaticus.base_policies.base_combined").Heuristic_CTF_Agent
-    game, (observations, infos) = new_game(seed)
+    env = game = new_game()
+    begun(game, seed)  # its agents read a game that has begun
     modes = {name: "hard" if k < 3 else opponent for k, name in enumerate(game.possible_agents)}
     boats = {name: agent(name, game, continuous=True, mode=mode) for name, mode in modes.items()}
-    env = game
     if shielded:
         env = ShieldedParallelEnv(game, Shield.for_game(game), team="blue")
-        observations, infos = env.reset(seed=seed)
-    random.seed(seed)
-    np.random.seed(seed)  # noqa: NPY002 - Pyquaticus' own policies draw from there
+    observations, infos = begun(env, seed)
     counts, was_inside = np.zeros((2, 2)), None
     while env.agents:
         driven = np.array([bool(boat.is_tagged or boat.oob) for boat in game.players.values()])
