@@ -106,9 +106,9 @@ def check_reader(make_env: Callable[[], Any]) -> None:
         raise ConfigError(f"make_env is {type(make_env).__name__}; give a function that builds the env: lambda: env")
     games = [_Played(make_env()) for _ in range(3)]
     plain, passed, steered = games
-    begun = [game.motion.fleets[0].state for game in (plain, passed)]
+    begun, again = (game.motion.fleets[0].state for game in (plain, passed))
     _hold(
-        np.array_equal(*begun, equal_nan=True),
+        np.array_equal(begun, again, equal_nan=True),
         "the game begins otherwise each time it is reset with the same seed; give an env whose starts follow the seed, "
         "or are fixed",
     )
