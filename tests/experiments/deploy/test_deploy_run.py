@@ -376,6 +376,6 @@ def test_a_file_with_nothing_to_command_says_why(fleet_file):
     fleet_file.write_text(text)
     with pytest.raises(FleetFileError, match="'blue_1' has a link and neither agent nor team: nobody here steers it"):
         read_fleet(orders_of(fleet_file))
-    fleet_file.write_text(text.replace("name: blue_1,", "name: blue_1, commanded: false,"))
+    fleet_file.write_text(text.replace("name: blue_1\n", "name: blue_1\n    commanded: false\n"))
     with pytest.raises(FleetFileError, match="no boat of team blue has a link"):
         read_fleet(orders_of(fleet_file))
