@@ -71,7 +71,7 @@ def _add(app: App, name: str, module: str) -> None:
 
 
 def _add_refusal(app: App, name: str, lacking: ConfigError) -> None:
-    anything: dict[str, Any] = {"ignore_unknown_options": True, "allow_extra_args": True, "help_option_names": []}
+    anything: dict[str, Any] = {"ignore_unknown_options": True, "allow_extra_args": True}
 
     @app.command(name, context_settings=anything, help=escape(f"Not installed: {lacking}"))
     def refuse(context: typer.Context) -> None:

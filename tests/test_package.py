@@ -117,6 +117,13 @@ def test_without_its_extra_a_command_is_one_line_that_names_it(arguments, extra)
     assert len(done.stderr.strip().splitlines()) == 1
 
 
+def test_help_of_a_command_that_lacks_its_extra_says_so_and_how_to_install_it():
+    done = bare("replay", "--help")
+    assert done.returncode == 0, done.stderr
+    assert "Not installed:" in done.stdout
+    assert "[boats]" in done.stdout
+
+
 def test_the_base_runs_commands_that_need_no_extra():
     done = bare("platform", "show")
     assert done.returncode == 0, done.stderr

@@ -68,6 +68,8 @@ class EntryGames(AblationSettings):
         """Judge the zip, which is handed in, and then the shield round the game, each against the bare entry."""
         import pandas as pd
 
+        if table.empty:  # interrupted before the first game ended
+            return []
         bare = table[(table["own"] == self.own) & ~table["shielded"]]
         of_zip = table[table["own"] == self.zip_file].assign(shielded=True)
         of_zip = of_zip.assign(pairing=self.own + " vs " + of_zip["opponent"])

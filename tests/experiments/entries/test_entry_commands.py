@@ -39,6 +39,19 @@ def test_a_check_tells_what_an_entry_imports_how_long_it_takes_and_that_it_plays
     assert content["game"]["duration_s"] == pytest.approx(3.0)
 
 
+def test_a_report_that_is_interrupted_before_its_first_game_says_how_to_go_on(write_entry, monkeypatch):
+    entry = write_entry("return 4")
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("steerclear.experiments.runner.outcomes", interrupted)
+    done = run("report", entry, "--opponents", "hold", "--games", "1", "--max-time", "3", "--out", "out")
+    assert done.exit_code == ExitCode.INTERRUPTED, done.stderr
+    assert "interrupted: 0 of 3 games" in done.stderr
+    assert "--out out --resume goes on from there" in done.stderr
+
+
 @pytest.mark.parametrize(
     ("entry", "words"),
     [
