@@ -71,7 +71,9 @@ def check(
         found = check_entry(entry, preset, max_time, answer_time)
     say(*check_lines(found))
     write_json(json_file, {"command": "entry check", "versions": versions(), "machine": machine(), **found})
-    if found["made_for"] is None and not found["failures"]:
+    if always_late(found):
+        say(f"next: let all boats of the team together answer within {found['decision_ms']:g} ms")
+    elif found["made_for"] is None and not found["failures"]:
         say(f"next: steerclear entry wrap {entry} --out shielded.zip")
     finish(not found["failures"] and not always_late(found))
 
@@ -90,7 +92,7 @@ def check_lines(found: dict[str, Any]) -> list[str]:
         f"({count_text(found['calls'], 'action')}); "
         f"{found['late_decisions']} took longer than the game gives ({found['decision_ms']:g} ms)",
         f"tried in {found['steps']} of the {found['game_steps']} decisions of a game",
-        f"in {game['duration_s']:g} s against boats that hold its boats made {made_in_game}; the game counted "
+        f"against boats that hold still, in {game['duration_s']:g} s: its boats made {made_in_game}; the game counted "
         f"{count_text(game['collisions'], 'collision')} of its boats (one for each of them in it)",
     ]
     if made is not None:
@@ -211,4 +213,5 @@ def wrap(
         warn(f"warning: {headline(tried)}{stops}")
     say_of_distance(settings["separation_m"], game, warn)
     say(f"{made['zip']}: {made['bytes'] / 1e6:.2f} MB; for preset {made['preset']}; {_kept(settings)}")
+    say(f"next: steerclear entry check {made['zip']}")
     write_json(json_file, {"command": "entry wrap", "versions": versions(), "machine": machine(), **made})

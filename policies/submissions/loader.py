@@ -207,9 +207,12 @@ class SubmissionCode(ForeignCode):
         with self._sandbox.active():
             asked = (self.stage.folder / CONFIG_FILE).is_file()
             ages = ages_of(self._run(CONFIG_FILE)) if asked else (0,)
-            found = getattr(self._run(ENTRY_FILE), CLASS_NAME, None)
+            module = self._run(ENTRY_FILE)
+            found = getattr(module, CLASS_NAME, None)
+            alike = [name for name in vars(module) if name != CLASS_NAME and name.lower() == CLASS_NAME]
         if not isinstance(found, type):
-            raise PolicyError(f"{ENTRY_FILE} of {self.stage.source} has no class {CLASS_NAME!r}; define one")
+            remedy = f"rename {alike[0]!r}: capitals count" if alike else "define one"
+            raise PolicyError(f"{ENTRY_FILE} of {self.stage.source} has no class {CLASS_NAME!r}; {remedy}")
         if not callable(getattr(found, METHOD_NAME, None)):
             raise PolicyError(f"class {CLASS_NAME!r} of {self.stage.source} has no method {METHOD_NAME!r}; define one")
         return found, ages
@@ -233,6 +236,10 @@ class SubmissionCode(ForeignCode):
         remedy = ""
         if isinstance(error, ModuleNotFoundError):
             remedy = f"; install {error.name!r} here or put it beside {ENTRY_FILE}"
+        elif isinstance(error, FileNotFoundError):
+            remedy = f"; put the file beside {ENTRY_FILE} and open it by Path(__file__).parent"
+        elif isinstance(error, TypeError) and "__init__()" in str(error):
+            remedy = "; its __init__ is given no arguments"
         return PolicyError(f"submission {self.stage.source}: {what}: {self.told(describe_error(error))}{remedy}")
 
 

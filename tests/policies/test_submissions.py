@@ -179,12 +179,13 @@ def test_the_seed_decides_a_submissions_random_numbers(game, write_entry, load):
             r"solution.py cannot be imported: SyntaxError: [a-z ]+ \(\S*entry/solution.py:2\)$",
         ),
         ("raise SystemExit(0)\n", r"cannot be imported: SystemExit"),
-        ("class Solution:\n    pass\n", r"has no class 'solution'"),
-        ("solution = 4\n", r"has no class 'solution'"),
+        ("class Solution:\n    pass\n", r"has no class 'solution'; rename 'Solution': capitals count$"),
+        ("open('weights.npy')\n", r"FileNotFoundError.*; put the file beside solution.py and open it by"),
+        ("solution = 4\n", r"has no class 'solution'; define one$"),
         ("class solution:\n    pass\n", r"has no method 'compute_action'"),
         (
             "class solution:\n    def __init__(self, x):\n        pass\n    def compute_action(self):\n        pass\n",
-            r"solution\(\) cannot be built: TypeError",
+            r"solution\(\) cannot be built: TypeError.*; its __init__ is given no arguments$",
         ),
     ],
 )

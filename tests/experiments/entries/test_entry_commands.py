@@ -29,7 +29,10 @@ def test_a_check_tells_what_an_entry_imports_how_long_it_takes_and_that_it_plays
     assert "loads in" in done.stdout
     assert "numpy" in done.stdout
     assert "not installed here: nowhere_is" in done.stdout
-    assert "in 3 s against boats that hold its boats made 0 captures, 0 grabs, 0 tags; the game counted " in done.stdout
+    assert "against boats that hold still, in 3 s: its boats made 0 captures, 0 grabs, 0 tags; the game " in done.stdout
+        "against boats that hold still, in 3 s: its boats made 0 captures, 0 grabs, 0 tags; the game counted "
+        in done.stdout
+    )
     content = json.loads(Path("a.json").read_text())
     assert undocumented(content, KEYS["entry check"]) == []
     told = {"calls": 9, "held": 0, "decision_ms": 1000.0, "decisions": 3, "steps": 3, "failed_steps": {}}
@@ -88,6 +91,7 @@ def test_an_entry_that_is_late_in_every_decision_is_said_and_no_success(write_en
     done = run("check", entry, "--max-time", "2")
     assert done.exit_code == ExitCode.GOAL_MISSED, done.output
     assert "but all 2 decisions took longer than the game gives" in done.stdout.splitlines()[0]
+    assert done.stdout.splitlines()[-1].startswith("next: let all boats of the team together answer within ")
     wrapped = run("wrap", entry, "--out", "late.zip")
     assert wrapped.exit_code == ExitCode.OK
     assert "warning:" in wrapped.stderr
